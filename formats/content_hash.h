@@ -1,0 +1,20 @@
+#ifndef HEDDLE_FORMATS_CONTENT_HASH_H_
+#define HEDDLE_FORMATS_CONTENT_HASH_H_
+// XXH3-128 as 32 lower-case hexadecimal digits: cache keys and checksums (not a security measure).
+
+#include <cstddef>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <string_view>
+
+namespace heddle {
+
+std::string content_hash(std::span<const std::byte> bytes);
+std::string content_hash(std::string_view text);
+/// Hash of a whole file, read in blocks. Errors: FileError.
+std::string content_hash_of_file(const std::filesystem::path& path);
+
+}  // namespace heddle
+
+#endif  // HEDDLE_FORMATS_CONTENT_HASH_H_
