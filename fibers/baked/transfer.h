@@ -1,0 +1,39 @@
+#ifndef HEDDLE_FIBERS_BAKED_TRANSFER_H_
+#define HEDDLE_FIBERS_BAKED_TRANSFER_H_
+// Run-time form of the incoming indirect radiance transfer function (IIRTF): per cell a matrix of real spherical harmonics
+// coefficients, c_T[j1] = sum over j0 of a[j0][j1] * c_light[j0], j0 the light and j1 the incoming direction, fabric space
+// (Khungurn 2017, sections 4.2 and 5.3; index order corrected as in design section 3).
+// Tested in tests/fibers/baked/transfer_test.cpp.
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "fibers/baked/cell_grid.h"
+#include "fibers/math/vector.h"
+
+namespace heddle {
+
+struct Transfer {
+  int order = 5;  // highest SH band; (order + 1)^2 coefficients
+  CellGrid grid;
+  bool both_sides = false;            // light from the whole sphere; otherwise only from the face side (z > 0)
+  std::vector<float> matrices;        // [cell][j0][j1][rgb]
+  std::vector<float> standard_error;  // [cell][band of j1][rgb]: rms over the entries of the band
+  std::vector<std::uint32_t> paths;   // [cell] paths spent; 0 for a cell without segments
+
+  int coefficients() const { return (order + 1) * (order + 1); }
+
+  /// c_T = a^T c_light for one cell: light [j0] -> incoming [j1][rgb].
+  void incoming(std::uint32_t cell, const float* light, float* result) const;
+};
+
+void write_transfer(const std::filesystem::path& path, const Transfer& transfer,
+                    const std::map<std::string, std::string>& metadata);
+Transfer read_transfer(const std::filesystem::path& path);
+
+}  // namespace heddle
+
+#endif  // HEDDLE_FIBERS_BAKED_TRANSFER_H_
