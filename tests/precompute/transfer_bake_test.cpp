@@ -24,7 +24,7 @@ TransferSettings settings_of(int order, int paths, bool both_sides) {
 }
 
 // Light 1 from everywhere on white fibers: indirect light fills exactly what the sky does not,
-// sqrt(4 pi) a[0][j] + integral of V Y_j = sqrt(4 pi) delta_j0, V the mean visibility of the cell's segments.
+// sqrt(4 pi) a[0][j] + integral of V Y_j = sqrt(4 pi) delta_j0, V the mean visibility of the cell's segments, weighted as the baker weights them.
 TEST(TransferBakeStatistical, FurnaceBalancesVisibility) {
   Exemplar exemplar = synthesize(test::small_fabric());
   exemplar.scattering = {test::white_fiber()};
@@ -35,20 +35,25 @@ TEST(TransferBakeStatistical, FurnaceBalancesVisibility) {
   const TransferBaker baker(scene, materials, settings, grid);
   const std::vector<TransferChunk> chunks = {baker.bake(0, grid.count())};
   const Transfer transfer = baker.assemble(chunks);
+  const std::vector<float> openness = segment_openness(scene, true, settings.seed);
   double worst = 0;
   int compared = 0;
   for (std::uint32_t cell = 0; cell < grid.count(); ++cell) {
     if (transfer.paths[cell] == 0) continue;
     std::vector<std::uint32_t> segments;
+    float most_open = 0;
     for (std::uint32_t s = 0; s < exemplar.segment_count(); ++s) {
-      if (grid.cell_of(exemplar.segment_midpoint(s)) == cell) segments.push_back(s);
+      if (grid.cell_of(exemplar.segment_midpoint(s)) != cell) continue;
+      segments.push_back(s);
+      most_open = std::max(most_open, openness[s]);
     }
     const int samples = 16384;
     double open[9] = {};
     double open_squares[9] = {};
     for (int i = 0; i < samples; ++i) {
       RandomStream random(1, RandomStage::kTest, 30 + cell, static_cast<std::uint64_t>(i));
-      const std::uint32_t s = segments[random.index(segments.size())];
+      std::uint32_t s = segments[random.index(segments.size())];
+      while (random.uniform() * most_open > openness[s]) s = segments[random.index(segments.size())];
       const Vec3 w = sample_sphere(random);
       if (scene.occluded({exemplar.segment_midpoint(s), w}, exemplar.segment_fiber[s])) continue;
       float y[9];

@@ -28,10 +28,10 @@ TEST(FabricConfig, EachClassOfErrorNamesPlaceAndExpectation) {
   const std::vector<std::array<std::string, 3>> cases = {
       // changed text, replacement, what the message must hold
       {"radius_um = 14", "radius_mm = 0.014", "radius_um"},
-      {"radius_um = 14", "radius_um = nan", "fabric.toml:12:"},
+      {"radius_um = 14", "radius_um = nan", "fabric.toml:11:"},
       {"radius_um = 14", "radius_um = \"14\"", "number"},
       {"radius_um = 14", "radius_um = -3", "0.1"},
-      {"radius_um = 14", "radius_um = 14\nradius_km = 2", "fabric.toml:13:"},
+      {"radius_um = 14", "radius_um = 14\nradius_km = 2", "fabric.toml:12:"},
       {"segment_um = 60", "", "segment_um"},
       {"\"plain\"", "\"basket\"", "twill UP/DOWN"},
       {"\"plain\"", "\"satin 6/2\"", "face"},
