@@ -1,0 +1,50 @@
+#include "formats/content_hash.h"
+
+#include <fmt/format.h>
+#include <xxhash.h>
+
+#include <fstream>
+#include <memory>
+#include <vector>
+
+#include "formats/input_error.h"
+
+namespace heddle {
+
+namespace {
+
+std::string hexadecimal(XXH128_hash_t hash) {
+  return fmt::format("{:016x}{:016x}", hash.high64, hash.low64);
+}
+
+struct FreeState {
+  void operator()(XXH3_state_t* state) const { XXH3_freeState(state); }
+};
+
+}  // namespace
+
+std::string content_hash(std::span<const std::byte> bytes) {
+  return hexadecimal(XXH3_128bits(bytes.data(), bytes.size()));
+}
+
+std::string content_hash(std::string_view text) {
+  return content_hash(std::as_bytes(std::span(text)));
+}
+
+std::string content_hash_of_file(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  const std::unique_ptr<XXH3_state_t, FreeState> state(XXH3_createState());
+  if (!file || state == nullptr || std::filesystem::is_directory(path)) {
+    throw FileError(path.string() + ": cannot open");
+  }
+  XXH3_128bits_reset(state.get());
+  std::vector<char> block(std::size_t{1} << 20);
+  while (file) {
+    file.read(block.data(), static_cast<std::streamsize>(block.size()));
+    XXH3_128bits_update(state.get(), block.data(), static_cast<std::size_t>(file.gcount()));
+  }
+  if (!file.eof()) throw FileError(path.string() + ": cannot read");
+  return hexadecimal(XXH3_128bits_digest(state.get()));
+}
+
+}  // namespace heddle

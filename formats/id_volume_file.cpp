@@ -1,0 +1,1 @@
+#include "formats/id_volume_file.h"

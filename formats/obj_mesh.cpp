@@ -1,0 +1,1 @@
+#include "formats/obj_mesh.h"
