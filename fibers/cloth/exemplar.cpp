@@ -1,0 +1,128 @@
+#include "fibers/cloth/exemplar.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "formats/input_error.h"
+#include "formats/tensor_file.h"
+
+namespace heddle {
+namespace {
+
+[[noreturn]] void broken(const std::string& name, int invariant, const std::string& what) {
+  throw FileError(fmt::format("{}: invariant {} of the exemplar does not hold: {}", name, invariant, what));
+}
+
+// Invariant 1 alone: what index_segments() relies on.
+void validate_layout(const Exemplar& e, const std::string& name) {
+  const std::size_t fibers = e.radius_mm.size();
+  if (fibers == 0 || e.first_point.size() != fibers + 1 || e.material.size() != fibers || e.first_point[0] != 0 ||
+      e.first_point.back() != e.points.size()) {
+    broken(name, 1, "the fibers do not cover the points exactly");
+  }
+  for (std::size_t f = 0; f < fibers; ++f) {
+    if (e.first_point[f + 1] < e.first_point[f] + 3 || e.first_point[f + 1] > e.points.size()) {
+      broken(name, 1, fmt::format("fiber {} has fewer than 2 segments", f));
+    }
+  }
+}
+
+// Per material: color_r, color_tt, beta_r, beta_tt, gamma_tt, isotropic_white.
+constexpr std::size_t kScatteringNumbers = 10;
+
+}  // namespace
+
+void index_segments(Exemplar& e) {
+  e.segment_point.clear();
+  e.segment_fiber.clear();
+  e.z_min = std::numeric_limits<float>::infinity();
+  e.z_max = -e.z_min;
+  for (std::uint32_t f = 0; f < e.fiber_count(); ++f) {
+    for (std::uint32_t p = e.first_point[f]; p < e.first_point[f + 1]; ++p) {
+      e.z_min = std::min(e.z_min, e.points[p].z() - e.radius_mm[f]);
+      e.z_max = std::max(e.z_max, e.points[p].z() + e.radius_mm[f]);
+      if (p + 1 == e.first_point[f + 1]) break;
+      e.segment_point.push_back(p);
+      e.segment_fiber.push_back(f);
+    }
+  }
+}
+
+void validate_exemplar(const Exemplar& e, const std::string& name) {
+  validate_layout(e, name);
+  if (!(e.width_mm > 0 && e.width_mm < 1e4F && e.height_mm > 0 && e.height_mm < 1e4F)) {
+    broken(name, 2, "the tile's size is not between 0 and 10,000 mm");
+  }
+  for (std::size_t i = 0; i < e.points.size(); ++i) {
+    if (!e.points[i].allFinite()) broken(name, 2, fmt::format("point {} is not finite", i));
+  }
+  for (std::size_t f = 0; f < e.fiber_count(); ++f) {
+    const float r = e.radius_mm[f];
+    if (!(r > 0 && r < 0.5F * std::min(e.width_mm, e.height_mm))) {
+      broken(name, 2, fmt::format("fiber {} has radius {} mm", f, r));
+    }
+    const Vec3 period = e.points[e.first_point[f + 1] - 1] - e.points[e.first_point[f]];
+    const float tolerance = 1e-5F * std::max(e.width_mm, e.height_mm);
+    if ((period - Vec3(e.width_mm, 0, 0)).norm() > tolerance && (period - Vec3(0, e.height_mm, 0)).norm() > tolerance) {
+      broken(name, 3, fmt::format("fiber {} does not continue in the next tile", f));
+    }
+    for (std::uint32_t p = e.first_point[f]; p + 1 < e.first_point[f + 1]; ++p) {
+      if ((e.points[p + 1] - e.points[p]).norm() < 1e-3F * r) {
+        broken(name, 4, fmt::format("fiber {} has a segment of no length at point {}", f, p));
+      }
+    }
+    if (e.material[f] >= e.scattering.size()) {
+      broken(name, 5, fmt::format("fiber {} has material {} of {}", f, e.material[f], e.scattering.size()));
+    }
+  }
+}
+
+void write_exemplar(const std::filesystem::path& path, const Exemplar& e,
+                    const std::map<std::string, std::string>& metadata) {
+  TensorFileWriter file;
+  for (const auto& [key, value] : metadata) file.set_metadata(key, value);
+  file.set_metadata("kind", "fibers");
+  std::vector<float> points;
+  for (const Vec3& p : e.points) points.insert(points.end(), {p.x(), p.y(), p.z()});
+  std::vector<double> scattering;
+  for (const FiberScattering& s : e.scattering) {
+    for (const Rgbd* color : {&s.color_r, &s.color_tt}) {
+      scattering.insert(scattering.end(), {color->x(), color->y(), color->z()});
+    }
+    scattering.insert(scattering.end(), {s.beta_r, s.beta_tt, s.gamma_tt, s.isotropic_white ? 1.0 : 0.0});
+  }
+  const float tile[2] = {e.width_mm, e.height_mm};
+  file.add<float>("tile_mm", {2}, tile);
+  file.add<float>("points_mm", {e.points.size(), 3}, points);
+  file.add<std::uint32_t>("first_point", {e.first_point.size()}, e.first_point);
+  file.add<float>("radius_mm", {e.radius_mm.size()}, e.radius_mm);
+  file.add<std::uint16_t>("material", {e.material.size()}, e.material);
+  file.add<double>("scattering", {e.scattering.size(), kScatteringNumbers}, scattering);
+  file.write(path);
+}
+
+Exemplar read_exemplar(const std::filesystem::path& path) {
+  const TensorFile file = TensorFile::read(path);
+  Exemplar e;
+  const auto tile = file.get<float>("tile_mm", {2});
+  e.width_mm = tile[0];
+  e.height_mm = tile[1];
+  const auto points = file.get<float>("points_mm", {0, 3});
+  for (std::size_t i = 0; i + 2 < points.size(); i += 3) {
+    e.points.emplace_back(points[i], points[i + 1], points[i + 2]);
+  }
+  e.first_point = file.get<std::uint32_t>("first_point", {0});
+  e.radius_mm = file.get<float>("radius_mm", {0});
+  e.material = file.get<std::uint16_t>("material", {0});
+  const auto scattering = file.get<double>("scattering", {0, kScatteringNumbers});
+  for (std::size_t i = 0; i < scattering.size(); i += kScatteringNumbers) {
+    const double* v = scattering.data() + i;
+    e.scattering.push_back({Rgbd(v[0], v[1], v[2]), Rgbd(v[3], v[4], v[5]), v[6], v[7], v[8], v[9] != 0});
+  }
+  validate_exemplar(e, path.string());
+  index_segments(e);
+  return e;
+}
+
+}  // namespace heddle

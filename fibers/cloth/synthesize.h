@@ -1,0 +1,27 @@
+#ifndef HEDDLE_FIBERS_CLOTH_SYNTHESIZE_H_
+#define HEDDLE_FIBERS_CLOTH_SYNTHESIZE_H_
+// Weave, yarns, plies, fibers: the exemplar tile of a fabric. Tested in tests/fibers/cloth/synthesize_test.cpp.
+
+#include "fibers/cloth/exemplar.h"
+#include "fibers/cloth/fabric_config.h"
+
+namespace heddle {
+
+/// The same config gives the same bytes. Throws std::invalid_argument as lay_yarns().
+Exemplar synthesize(const FabricConfig& config);
+
+/// What a user wants to know of an exemplar's geometry.
+struct ExemplarSummary {
+  std::size_t fibers = 0;
+  std::size_t segments = 0;
+  double thickness_mm = 0;
+  double volume_fraction = 0;         // fiber volume / (tile area x thickness)
+  double mean_segment_mm = 0;
+  double areal_fiber_length_per_mm2 = 0;  // mm of fiber per mm^2 of cloth
+  double wander_rms_deg = 0;          // rms angle of fiber segments against the yarn's own direction in the plane
+};
+ExemplarSummary summarize(const Exemplar& exemplar);
+
+}  // namespace heddle
+
+#endif  // HEDDLE_FIBERS_CLOTH_SYNTHESIZE_H_

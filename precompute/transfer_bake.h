@@ -1,0 +1,73 @@
+#ifndef HEDDLE_PRECOMPUTE_TRANSFER_BAKE_H_
+#define HEDDLE_PRECOMPUTE_TRANSFER_BAKE_H_
+// Estimates the indirect light transfer (IIRTF) of every cell by light paths on the endless flat cloth.
+//
+// A path leaves a segment's midpoint towards a uniform direction w1; if it hits a fiber it scatters by BCSDF sampling until
+// it leaves the cloth in direction w0, and adds 4 pi * throughput * Y_j0(w0) * Y_j1(w1) to a[j0][j1] of the segment's cell.
+// Light from the face only: paths that leave with w0.z <= 0 are dropped. One path so serves every light direction, where
+// the estimator of Khungurn 2017, section 4.2 (w0 and w1 both uniform) serves one and pays for narrow lobes with noise;
+// tests/bench/transfer_estimators.cpp holds both.
+// Paths come in batches, stratified over w1 and over the cell's segments; the spread of the batch means gives the
+// standard error, and a cell is done when its error meets the target.
+// Cells are independent and draw from (seed, cell, path), so any range of cells can be baked alone, by any number of
+// threads, with the same result. Tested in tests/precompute/transfer_bake_test.cpp.
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "fibers/baked/transfer.h"
+#include "fibers/scattering/bcsdf_table.h"
+#include "fibers/tracing/tile_scene.h"
+#include "formats/toml_table.h"
+
+namespace heddle {
+
+struct TransferSettings {
+  int order = 5;                    // SH bands 0 .. order, light and incoming alike
+  double cell_mean_free_paths = 1;  // edge of a cell in mean free paths
+  int min_paths = 0;                // per cell, rounded up to whole batches
+  int max_paths = 0;
+  double target_error = 0;          // standard error of the matrix (Frobenius norm) relative to its norm
+  bool both_sides = false;
+  std::uint64_t seed = 1;
+};
+
+/// Reads the section [transfer]; both_sides and seed are the fabric's.
+TransferSettings read_transfer_settings(const TomlTable& section);
+
+struct TransferChunk {
+  std::uint32_t first_cell = 0;
+  std::vector<float> matrices;        // [cell][j0][j1][rgb]
+  std::vector<float> standard_error;  // [cell][band of j1][rgb]
+  std::vector<std::uint32_t> paths;   // [cell]
+};
+
+class TransferBaker {
+ public:
+  static constexpr int kBatch = 1024;  // paths per batch
+
+  /// The scene and the tables must outlive the baker.
+  TransferBaker(const TileScene& scene, std::span<const BcsdfTable> materials, const TransferSettings& settings,
+                const CellGrid& grid);
+
+  /// Cells first .. last - 1, in parallel.
+  TransferChunk bake(std::uint32_t first_cell, std::uint32_t last_cell) const;
+  /// All chunks, in order of their cells, as one artifact.
+  Transfer assemble(std::span<const TransferChunk> chunks) const;
+
+  std::uint32_t cell_count() const { return grid_.count(); }
+
+ private:
+  void bake_cell(std::uint32_t cell, float* matrix, float* standard_error, std::uint32_t* paths) const;
+
+  const TileScene* scene_;
+  std::span<const BcsdfTable> materials_;
+  TransferSettings settings_;
+  CellGrid grid_;
+  std::vector<std::vector<std::uint32_t>> segments_of_cell_;  // [cell] segments whose midpoint lies in it
+};
+
+}  // namespace heddle
+
+#endif  // HEDDLE_PRECOMPUTE_TRANSFER_BAKE_H_
