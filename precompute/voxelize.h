@@ -1,0 +1,30 @@
+#ifndef HEDDLE_PRECOMPUTE_VOXELIZE_H_
+#define HEDDLE_PRECOMPUTE_VOXELIZE_H_
+// Rasterises the exemplar into a volume of segment ids, through which the renderer finds what an eye ray sees
+// without tracing fibers (Khungurn 2017, section 5.1). A voxel is filled where its centre lies within a
+// fiber; it holds the segment whose axis is nearest to its centre. The paper takes the nearest midpoint:
+// between long thin segments side by side that is often a segment of the neighbouring fiber (or the wrong one
+// of the same fiber), with another tangent and another material. Ties go to the lower id. The grid is
+// periodic in x and y: a tile is a whole number of voxels wide and high, so the edges of a voxel differ
+// slightly from each other. Single-threaded. Tested in tests/precompute/voxelize_test.cpp.
+
+#include "fibers/cloth/exemplar.h"
+#include "formats/id_volume_file.h"
+#include "formats/toml_table.h"
+
+namespace heddle {
+
+struct VolumeSettings {
+  /// Voxels along the radius of the thinnest fiber.
+  double voxels_per_radius = 1;
+};
+
+/// Reads the keys of a fabric's section [volume].
+VolumeSettings read_volume_settings(const TomlTable& section);
+
+/// Throws ConfigError where the tile would need more than 2^31 voxels.
+IdVolume voxelize(const Exemplar& exemplar, const VolumeSettings& settings);
+
+}  // namespace heddle
+
+#endif  // HEDDLE_PRECOMPUTE_VOXELIZE_H_
