@@ -1,0 +1,77 @@
+#include "fibers/math/random.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <set>
+#include <vector>
+
+#include "tests/support/statistics.h"
+
+namespace heddle {
+namespace {
+
+TEST(Random, ADrawDependsOnItsAddressOnly) {
+  RandomStream first(7, RandomStage::kTest, 3, 5);
+  RandomStream second(7, RandomStage::kTest, 3, 5);
+  for (int k = 0; k < 100; ++k) EXPECT_EQ(first.bits(), second.bits());
+}
+
+TEST(Random, NeighbouringAddressesShareNoDraw) {
+  std::set<std::uint64_t> seen;
+  std::size_t draws = 0;
+  for (std::uint64_t seed = 0; seed < 4; ++seed) {
+    for (const RandomStage stage : {RandomStage::kTest, RandomStage::kTransfer}) {
+      for (std::uint64_t item = 0; item < 20; ++item) {
+        for (std::uint64_t sample = 0; sample < 20; ++sample) {
+          RandomStream random(seed, stage, item, sample);
+          for (int k = 0; k < 20; ++k, ++draws) seen.insert(random.bits());
+        }
+      }
+    }
+  }
+  EXPECT_EQ(seen.size(), draws);  // 64,000 draws of 64 bits: a chance collision has probability 1e-10
+}
+
+TEST(Random, UniformStaysBelowOne) {
+  RandomStream random(1, RandomStage::kTest, 0, 0);
+  for (int k = 0; k < 1000000; ++k) {
+    const float u = random.uniform();
+    ASSERT_TRUE(u >= 0.0F && u < 1.0F);
+  }
+}
+
+// Pairs of draws fill the square evenly, along the dimension, the sample and the item alike.
+TEST(RandomStatistical, PairsOfDrawsAreUniform) {
+  constexpr int kCount = 400000;
+  constexpr int kSide = 32;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<double> observed(kSide * kSide, 0.0);
+    const std::vector<double> expected(kSide * kSide, static_cast<double>(kCount) / (kSide * kSide));
+    for (int k = 0; k < kCount; ++k) {
+      const auto i = static_cast<std::uint64_t>(k);
+      RandomStream a(11, RandomStage::kTest, axis == 2 ? i : 0, axis == 1 ? i : 0);
+      RandomStream b(11, RandomStage::kTest, axis == 2 ? i + 1 : 0, axis == 1 ? i + 1 : 0);
+      if (axis == 0) b = a = RandomStream(11, RandomStage::kTest, i, 9);
+      const double u = a.uniform();
+      if (axis == 0) b = a;
+      const double v = b.uniform_double();
+      observed[static_cast<std::size_t>(static_cast<int>(u * kSide) * kSide + static_cast<int>(v * kSide))] +=
+          1.0;
+    }
+    const ChiSquareResult result = chi_square(expected, observed);
+    std::printf("  pairs along axis %d: chi-square %.1f, %d degrees, p = %.3g\n", axis, result.statistic,
+                result.degrees, result.p_value);
+    EXPECT_GT(result.p_value, sidak_significance(3));
+  }
+}
+
+TEST(RandomStatistical, IndexIsUniform) {
+  RandomStream random(3, RandomStage::kTest, 1, 0);
+  std::vector<double> observed(7, 0.0);
+  for (int k = 0; k < 70000; ++k) observed[random.index(7)] += 1.0;
+  EXPECT_GT(chi_square(std::vector<double>(7, 10000.0), observed).p_value, kSignificance);
+}
+
+}  // namespace
+}  // namespace heddle
