@@ -254,7 +254,7 @@ double TileScene::mean_free_path(std::uint64_t seed, int samples) const {
                                                        exemplar_.segment_count() - 1));
     const std::uint32_t p = exemplar_.segment_point[s];
     const Vec3 origin = exemplar_.points[p] + random.uniform() * (exemplar_.points[p + 1] - exemplar_.points[p]);
-    const Vec3 direction = sample_uniform_sphere(random);
+    const Vec3 direction = sample_sphere(random);
     if (const auto hit = intersect({origin, direction}, exemplar_.segment_fiber[s])) {
       sum += hit->t;
       ++hits;

@@ -1,0 +1,63 @@
+#ifndef HEDDLE_RENDER_MULTIPLE_SCATTERING_H_
+#define HEDDLE_RENDER_MULTIPLE_SCATTERING_H_
+// Light that scatters more than once, from the precomputed transfer of a cell (Khungurn 2017, section 5.3.1), in real
+// spherical harmonics. Everything is in fabric space. Radiance for a light of irradiance 1, before macroscopic shadows.
+//
+//   c_light[j]   directional: Y_j(w); spherical Gaussian: A_l(sharpness) Y_lm(axis)
+//   c_T          = a^T c_light: the indirect light that arrives at the cell (Transfer::incoming)
+//   outgoing     = c_S(theta_o) . D(R) c_T: rotated into the wo-space (x = tangent, wo in the xy plane, y > 0) of the BCSDF's
+//                  coefficients
+// A truncated expansion rings: an incoming field, and with it the outgoing radiance, can be slightly negative. Signs are kept,
+// so that sums over samples have the expansion's mean; who shows a picture may clamp it.
+// Under light from the face only, the transfer is 0 for light from below; its expansion is not, so directional light from below
+// is cut here.
+// Cost at order 5: incoming 0.5 us, outgoing 0.5 us. Tested in tests/render/multiple_scattering_test.cpp.
+
+#include <array>
+#include <optional>
+#include <span>
+
+#include "fibers/baked/transfer.h"
+#include "fibers/math/spherical_harmonics.h"
+#include "fibers/math/vector.h"
+#include "fibers/scattering/bcsdf_table.h"
+
+namespace heddle {
+
+/// Indirect light that arrives at a point, fabric space.
+using IncomingField = std::array<float, 3 * sh_count(kMaxShOrder)>;  // [j][rgb]; the first sh_count(order) are used
+
+class MultipleScattering {
+ public:
+  /// What is passed must outlive this object.
+  MultipleScattering(const Transfer& transfer, std::span<const BcsdfTable> materials)
+      : transfer_(&transfer), materials_(materials) {}
+
+  /// A light's shape: band factors A_l, computed once for all samples. Without a sharpness: directional.
+  class LightShape {
+   public:
+    explicit LightShape(std::optional<float> sharpness);
+
+   private:
+    friend class MultipleScattering;
+    bool directional_;
+    std::array<float, kMaxShOrder + 1> band_;  // [l]
+  };
+
+  /// Field at `cell` under a light about `axis` (unit, fabric space).
+  void incoming(std::uint32_t cell, const LightShape& light, const Vec3& axis, IncomingField& field) const;
+
+  /// Radiance towards wo from a fiber with this tangent in the field (unit vectors, fabric space).
+  Rgb outgoing(const IncomingField& field, std::uint16_t material, const Vec3& tangent, const Vec3& wo) const;
+
+ private:
+  const Transfer* transfer_;
+  std::span<const BcsdfTable> materials_;
+};
+
+/// Axes of wo-space as rows: x = tangent, wo = (sin theta_o, cos theta_o, 0). Any y where wo is along the tangent.
+Mat3 wo_space(const Vec3& tangent, const Vec3& wo);
+
+}  // namespace heddle
+
+#endif  // HEDDLE_RENDER_MULTIPLE_SCATTERING_H_
