@@ -4,11 +4,11 @@
 // 1 beyond a limit that was asked for. Failures are exceptions: ConfigError (2), FileError (1), Interrupted (128 + signal).
 // Data goes to standard output, messages and progress to standard error. Tested in tests/pipeline/end_to_end_test.cpp.
 
-#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "pipeline/stages.h"
 
@@ -32,6 +32,41 @@ struct StageOptions {
 };
 /// Prints the path of the artifact.
 int stage_command(const StageOptions& options, const CommonOptions& common);
+
+struct RunOptions {
+  std::filesystem::path scene;
+  std::filesystem::path output;  // folder; out/SCENE where empty
+  std::optional<int> order;
+};
+/// For every view of the scene, in `output`: NAME.exr, NAME.png and NAME.json, and where the view asks for a reference
+/// NAME.reference.* (path-traced) and NAME.difference.* of a crop. Pictures are cached like artifacts of stages.
+int run_command(const RunOptions& options, const CommonOptions& common);
+
+struct RenderOptions {
+  std::filesystem::path scene;
+  std::filesystem::path output;
+  std::string view;
+  std::string method;              // the scene's where empty
+  std::optional<int> spp;
+  std::optional<double> seconds;   // the path tracer's time
+  std::vector<int> crop;           // x0, y0, x1, y1, or empty
+  bool local = false;
+  std::optional<int> bounces;
+  std::string estimator;           // "mis" where empty
+  std::optional<int> order;
+};
+int render_command(const RenderOptions& options, const CommonOptions& common);
+
+struct CompareOptions {
+  std::filesystem::path a;
+  std::filesystem::path b;
+  std::optional<std::filesystem::path> output;
+  std::string layer;               // the beauty where empty
+  std::optional<double> max_rmse;
+  std::optional<double> max_mean;
+};
+/// Status 1 where a limit is exceeded; ConfigError (2) where the pictures cannot be compared.
+int compare_command(const CompareOptions& options, const CommonOptions& common);
 
 /// Prints what a file holds.
 int info_command(const std::filesystem::path& path, const CommonOptions& common);
