@@ -1,1 +1,170 @@
 #include "formats/id_volume_file.h"
+
+#include <fmt/format.h>
+#include <openvdb/openvdb.h>
+#include <openvdb/tools/Dense.h>
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <fstream>
+#include <limits>
+
+#include "formats/atomic_file.h"
+#include "formats/input_error.h"
+
+namespace heddle {
+
+namespace {
+
+constexpr int kMaxExtent = 4096;
+constexpr std::uint64_t kMaxVoxels = std::uint64_t{1} << 31;
+constexpr std::int32_t kEmpty = -1;
+constexpr std::int32_t kMaxId = std::numeric_limits<std::int32_t>::max() - 1;  // OpenVDB takes id - kEmpty
+
+constexpr const char* kGridName = "segment_id";
+constexpr const char* kSizeKey = "size";
+constexpr const char* kVoxelKey = "voxel_mm";
+constexpr const char* kOriginKey = "origin_mm";
+
+// OpenVDB puts a random identifier (36 characters) into the header of each file it writes: after the magic
+// number (8 bytes), three version numbers (4 bytes each) and a flag (1 byte). Here it is all zeros.
+constexpr std::streamoff kIdentifierAt = 21;
+constexpr std::string_view kZeroIdentifier = "00000000-0000-0000-0000-000000000000";
+
+/// x fastest, like IdVolume::ids.
+using DenseIds = openvdb::tools::Dense<std::int32_t, openvdb::tools::LayoutXYZ>;
+
+/// Empty where the size is fine.
+std::string size_problem(const std::array<int, 3>& size) {
+  std::uint64_t voxels = 1;
+  for (const int extent : size) {
+    if (extent < 1 || extent > kMaxExtent) {
+      return fmt::format("{} voxels along an axis (1 to {})", extent, kMaxExtent);
+    }
+    voxels *= static_cast<std::uint64_t>(extent);
+  }
+  return voxels > kMaxVoxels ? fmt::format("{} voxels (at most {})", voxels, kMaxVoxels) : "";
+}
+
+openvdb::CoordBBox box_of(const std::array<int, 3>& size) {
+  return {openvdb::Coord(0), openvdb::Coord(size[0] - 1, size[1] - 1, size[2] - 1)};
+}
+
+openvdb::Vec3d vec(const std::array<double, 3>& v) {
+  return {v[0], v[1], v[2]};
+}
+std::array<double, 3> array(const openvdb::Vec3d& v) {
+  return {v.x(), v.y(), v.z()};
+}
+
+/// OpenVDB's index space has voxel centres at whole numbers.
+openvdb::math::Transform::Ptr transform_of(const IdVolume& volume) {
+  auto transform = openvdb::math::Transform::createLinearTransform();
+  transform->preScale(vec(volume.voxel_mm));
+  transform->postTranslate(vec(volume.origin_mm) + 0.5 * vec(volume.voxel_mm));
+  return transform;
+}
+
+void zero_identifier(const std::filesystem::path& path) {
+  std::fstream file(path, std::ios::binary | std::ios::in | std::ios::out);
+  std::string found(kZeroIdentifier.size(), '\0');
+  file.seekg(kIdentifierAt);
+  file.read(found.data(), static_cast<std::streamsize>(found.size()));
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    if ((found[i] == '-') != (kZeroIdentifier[i] == '-')) throw FileError("unexpected OpenVDB file header");
+  }
+  file.seekp(kIdentifierAt);
+  file.write(kZeroIdentifier.data(), static_cast<std::streamsize>(kZeroIdentifier.size()));
+  file.close();
+  if (!file) throw FileError("cannot patch the file header");
+}
+
+void write_vdb(const std::filesystem::path& path, const IdVolume& volume,
+               const std::map<std::string, std::string>& metadata) {
+  openvdb::initialize();
+  auto grid = openvdb::Int32Grid::create(kEmpty);
+  grid->setName(kGridName);
+  grid->setTransform(transform_of(volume));
+  for (const auto& [key, text] : metadata) grid->insertMeta(key, openvdb::StringMetadata(text));
+  grid->insertMeta(kSizeKey, openvdb::Vec3IMetadata({volume.size[0], volume.size[1], volume.size[2]}));
+  grid->insertMeta(kVoxelKey, openvdb::Vec3DMetadata(vec(volume.voxel_mm)));
+  grid->insertMeta(kOriginKey, openvdb::Vec3DMetadata(vec(volume.origin_mm)));
+  // A Dense wraps memory that may be written to; copyFromDense only reads it.
+  const DenseIds dense(box_of(volume.size), const_cast<std::int32_t*>(volume.ids.data()));
+  openvdb::tools::copyFromDense(dense, *grid, std::int32_t{0});
+
+  openvdb::io::File file(path.string());
+  std::uint32_t compression = openvdb::io::COMPRESS_ACTIVE_MASK;
+  if (openvdb::io::Archive::hasBloscCompression()) compression |= openvdb::io::COMPRESS_BLOSC;
+  file.setCompression(compression);
+  file.write(openvdb::GridCPtrVec{grid});
+  file.close();
+  zero_identifier(path);
+}
+
+template <class Metadata>
+auto required_metadata(const openvdb::GridBase& grid, const char* key) {
+  const auto value = grid.getMetadata<Metadata>(key);
+  if (value == nullptr) throw FileError(fmt::format("no metadata '{}'", key));
+  return value->value();
+}
+
+IdVolume read_vdb(const std::filesystem::path& path) {
+  openvdb::initialize();
+  openvdb::io::File file(path.string());
+  file.open(/*delayLoad=*/false);
+  const auto grid = openvdb::gridPtrCast<openvdb::Int32Grid>(file.readGrid(kGridName));
+  if (grid == nullptr) throw FileError(fmt::format("'{}' is not a grid of 32-bit integers", kGridName));
+
+  IdVolume volume;
+  const openvdb::Vec3i size = required_metadata<openvdb::Vec3IMetadata>(*grid, kSizeKey);
+  volume.size = {size.x(), size.y(), size.z()};
+  volume.voxel_mm = array(required_metadata<openvdb::Vec3DMetadata>(*grid, kVoxelKey));
+  volume.origin_mm = array(required_metadata<openvdb::Vec3DMetadata>(*grid, kOriginKey));
+  if (const std::string problem = size_problem(volume.size); !problem.empty()) throw FileError(problem);
+  for (int axis = 0; axis < 3; ++axis) {
+    if (!(volume.voxel_mm[axis] > 0) || !std::isfinite(volume.voxel_mm[axis]) ||
+        !std::isfinite(volume.origin_mm[axis])) {
+      throw FileError("voxel_mm or origin_mm is not a finite (positive) length");
+    }
+  }
+  const openvdb::CoordBBox active = grid->evalActiveVoxelBoundingBox();
+  if (!active.empty() && !box_of(volume.size).isInside(active))
+    throw FileError("voxels outside its own size");
+
+  volume.ids.resize(static_cast<std::size_t>(volume.size[0]) * volume.size[1] * volume.size[2]);
+  DenseIds dense(box_of(volume.size), volume.ids.data());
+  openvdb::tools::copyToDense(*grid, dense);
+  if (std::any_of(volume.ids.begin(), volume.ids.end(), [](std::int32_t id) { return id < kEmpty; })) {
+    throw FileError("an id below -1");
+  }
+  return volume;
+}
+
+}  // namespace
+
+void write_id_volume(const std::filesystem::path& path, const IdVolume& volume,
+                     const std::map<std::string, std::string>& metadata) {
+  assert(size_problem(volume.size).empty());
+  assert(std::all_of(volume.ids.begin(), volume.ids.end(),
+                     [](std::int32_t id) { return id >= kEmpty && id <= kMaxId; }));
+  assert(volume.ids.size() == static_cast<std::size_t>(volume.size[0]) * volume.size[1] * volume.size[2]);
+  write_file_atomically(path, [&](const std::filesystem::path& temporary) {
+    try {
+      write_vdb(temporary, volume, metadata);
+    } catch (const std::exception& error) {
+      throw FileError(fmt::format("{}: cannot write: {}", path.string(), error.what()));
+    }
+  });
+}
+
+IdVolume read_id_volume(const std::filesystem::path& path) {
+  try {
+    return read_vdb(path);
+  } catch (const std::exception& error) {
+    throw FileError(fmt::format("{}: cannot read as an id volume: {}", path.string(), error.what()));
+  }
+}
+
+}  // namespace heddle

@@ -2,7 +2,8 @@
 #define HEDDLE_FORMATS_ID_VOLUME_FILE_H_
 // A dense grid of ids as an OpenVDB Int32Grid (background -1 = empty) with string metadata; the only place that includes
 // OpenVDB. OpenVDB 10 is not safe on corrupt files: verify a checksum before calling read_id_volume.
-// Errors: FileError. Tested in tests/formats/id_volume_file_test.cpp.
+// Limits: 4096 voxels along an axis, 2^31 in all. Equal content gives equal bytes. Errors: FileError.
+// Tested in tests/formats/id_volume_file_test.cpp.
 
 #include <array>
 #include <cstdint>
@@ -17,7 +18,7 @@ struct IdVolume {
   std::array<int, 3> size = {0, 0, 0};               // voxels in x, y, z
   std::array<double, 3> voxel_mm = {0, 0, 0};        // edge lengths
   std::array<double, 3> origin_mm = {0, 0, 0};       // corner of voxel (0, 0, 0)
-  std::vector<std::int32_t> ids;                     // [z][y][x], -1 = empty
+  std::vector<std::int32_t> ids;                     // [z][y][x], -1 = empty, at most 2^31 - 2
 };
 
 void write_id_volume(const std::filesystem::path& path, const IdVolume& volume,

@@ -1,0 +1,66 @@
+#ifndef HEDDLE_FIBERS_MATH_SG_SUM_FIT_H_
+#define HEDDLE_FIBERS_MATH_SG_SUM_FIT_H_
+// Fits a binary map on the sphere by a sum of normalised spherical Gaussians of one sharpness about Fibonacci
+// axes: V(w) ~ sum over q of weight[q] G(w; axis[q], sharpness) / M(sharpness), weights in steradians, never
+// negative.
+//
+// kVoronoi is Khungurn 2017, section 4.1: a weight is the open solid angle that is nearer to its axis than to
+// any other. kNnls is the non-negative least-squares fit, over the whole sphere, of V blurred by a Gaussian
+// of sharpness kBlur: soft lights see no finer detail, and all integrals have closed forms. Errors of both:
+// docs/performance.md, "Visibility". Axes of the upper hemisphere stand for light from the face only: cells
+// whose centre lies below the horizon then count as closed. The axes may be turned about +z by whole columns.
+// Tested in tests/math/sg_sum_fit_test.cpp.
+
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "fibers/math/fibonacci_axes.h"
+#include "fibers/math/spherical_map.h"
+#include "fibers/math/vector.h"
+
+namespace heddle {
+
+enum class SgWeights { kVoronoi, kNnls };
+
+struct SgSumShape {
+  FibonacciSet axes = FibonacciSet::kHemisphere;
+  int count = 48;
+  double sharpness = 48;
+  SgWeights weights = SgWeights::kNnls;
+};
+
+class SgSumFit {
+ public:
+  static constexpr double kBlur = 30;
+
+  SgSumFit(int resolution, const SgSumShape& shape);
+
+  /// [lobe] before any turn about +z.
+  const std::vector<Vec3d>& axes() const { return axes_; }
+
+  /// [lobe] weights for the axes turned about +z by `turned_columns` (0 .. N - 1) columns of the map.
+  Eigen::VectorXd weights(const SphericalMap& map, int turned_columns = 0) const;
+
+ private:
+  SgWeights method_;
+  int resolution_;
+  int rows_;  // rows that count
+  std::vector<Vec3d> axes_;
+  std::vector<int> nearest_axis_;  // [row][column], kVoronoi
+  Eigen::Array<float, Eigen::Dynamic, Eigen::Dynamic>
+      projection_;  // [lobe, cell], kNnls: what an open cell adds
+  Eigen::MatrixXd gram_;
+};
+
+/// The sum in one direction.
+double sg_sum_value(const std::vector<Vec3d>& axes, const Eigen::VectorXd& weights, double sharpness,
+                    const Vec3d& direction);
+
+/// Integral of the normalised Gaussian G / M of `light_sharpness` about `direction` times the sum.
+double sg_sum_integral(const std::vector<Vec3d>& axes, const Eigen::VectorXd& weights, double sharpness,
+                       const Vec3d& direction, double light_sharpness);
+
+}  // namespace heddle
+
+#endif  // HEDDLE_FIBERS_MATH_SG_SUM_FIT_H_

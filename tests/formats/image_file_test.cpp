@@ -1,0 +1,255 @@
+#include "formats/image_file.h"
+
+#include <ImathBox.h>
+#include <ImfChannelList.h>
+#include <ImfDeepScanLineOutputFile.h>
+#include <ImfFrameBuffer.h>
+#include <ImfHeader.h>
+#include <ImfInputFile.h>
+#include <ImfMultiPartOutputFile.h>
+#include <ImfOutputFile.h>
+#include <ImfPartType.h>
+#include <ImfStandardAttributes.h>
+#include <ImfThreading.h>
+#include <ImfTiledOutputFile.h>
+#include <png.h>
+
+#include <cstring>
+#include <limits>
+
+#include "tests/formats/file_fixture.h"
+
+namespace heddle {
+namespace {
+
+class ImageFileFormat : public FileFixture {};
+
+Image sample(int width, int height) {
+  Image image;
+  image.width = width;
+  image.height = height;
+  const int n = width * height;
+  for (const char* name : {"R", "G", "B", "single.R"}) {
+    ImageChannel& channel = image.channels[name];
+    for (int i = 0; i < n; ++i)
+      channel.values.push_back(static_cast<float>((i * 37 + name[0]) % 256) / 256.0f);
+  }
+  ImageChannel& depth = image.channels["depth.Z"];
+  depth.type = ChannelType::kFloat;
+  for (int i = 0; i < n; ++i) depth.values.push_back(1.0f / static_cast<float>(i + 3));
+  ImageChannel& segment = image.channels["segment"];
+  segment.type = ChannelType::kUint;
+  for (int i = 0; i < n; ++i) segment.ids.push_back(4294967295u - static_cast<std::uint32_t>(i));
+  image.metadata = {{"heddle/method", "path"}, {"heddle/seed", "18446744073709551615"}};
+  return image;
+}
+
+void expect_equal(const Image& a, const Image& b) {
+  EXPECT_EQ(a.width, b.width);
+  EXPECT_EQ(a.height, b.height);
+  EXPECT_EQ(a.metadata, b.metadata);
+  ASSERT_EQ(a.channels.size(), b.channels.size());
+  for (const auto& [name, channel] : a.channels) {
+    ASSERT_TRUE(b.channels.contains(name)) << name;
+    const ImageChannel& other = b.channels.at(name);
+    EXPECT_EQ(channel.type, other.type) << name;
+    EXPECT_EQ(channel.values, other.values) << name;
+    EXPECT_EQ(channel.ids, other.ids) << name;
+  }
+}
+
+TEST_F(ImageFileFormat, RoundTripOfEveryChannelType) {
+  // Heights below, at and above a block of 16 scan lines.
+  for (const auto& [width, height] : {std::pair{1, 1}, {5, 16}, {13, 35}}) {
+    const Image image = sample(width, height);
+    write_exr(folder_ / "a.exr", image);
+    expect_equal(image, read_exr(folder_ / "a.exr"));
+  }
+}
+
+TEST_F(ImageFileFormat, HalvesAreClampedToFiniteValues) {
+  Image image;
+  image.width = 5;
+  image.height = 1;
+  const float inf = std::numeric_limits<float>::infinity();
+  image.channels["R"].values = {70000.0f, -1e30f, inf, -inf, 65504.0f};
+  write_exr(folder_ / "a.exr", image);
+  EXPECT_EQ(read_exr(folder_ / "a.exr").channels["R"].values,
+            (std::vector<float>{65504, -65504, 65504, -65504, 65504}));
+}
+
+TEST_F(ImageFileFormat, EqualImagesGiveEqualBytesForAnyNumberOfThreads) {
+  const Image image = sample(70, 90);
+  const int before = Imf::globalThreadCount();
+  Imf::setGlobalThreadCount(0);
+  write_exr(folder_ / "a.exr", image);
+  Imf::setGlobalThreadCount(3);
+  write_exr(folder_ / "b.exr", image);
+  const Image read = read_exr(folder_ / "b.exr");
+  Imf::setGlobalThreadCount(before);
+  EXPECT_EQ(bytes_of(folder_ / "a.exr"), bytes_of(folder_ / "b.exr"));
+  expect_equal(image, read);
+}
+
+TEST_F(ImageFileFormat, HeaderSaysRec709AndZip) {
+  write_exr(folder_ / "a.exr", sample(4, 4));
+  Imf::InputFile file((folder_ / "a.exr").c_str());
+  EXPECT_EQ(file.header().compression(), Imf::ZIP_COMPRESSION);
+  ASSERT_TRUE(Imf::hasChromaticities(file.header()));
+  const Imf::Chromaticities c = Imf::chromaticities(file.header());
+  // ITU-R BT.709-6, table 1.
+  EXPECT_EQ(c.red, Imath::V2f(0.64f, 0.33f));
+  EXPECT_EQ(c.green, Imath::V2f(0.30f, 0.60f));
+  EXPECT_EQ(c.blue, Imath::V2f(0.15f, 0.06f));
+  EXPECT_EQ(c.white, Imath::V2f(0.3127f, 0.3290f));
+}
+
+TEST_F(ImageFileFormat, ReadsTiledFilesAndShiftedWindows) {
+  const Imath::Box2i window({-7, 20}, {12, 44});
+  Imf::Header header(window, window);
+  header.channels().insert("R", Imf::Channel(Imf::FLOAT));
+  header.setTileDescription(Imf::TileDescription(8, 8));
+  std::vector<float> values(20 * 25);
+  for (std::size_t i = 0; i < values.size(); ++i) values[i] = static_cast<float>(i);
+  Imf::FrameBuffer pixels;
+  pixels.insert("R", Imf::Slice::Make(Imf::FLOAT, values.data(), window));
+  {
+    Imf::TiledOutputFile file((folder_ / "t.exr").c_str(), header);
+    file.setFrameBuffer(pixels);
+    file.writeTiles(0, file.numXTiles() - 1, 0, file.numYTiles() - 1);
+  }
+  const Image image = read_exr(folder_ / "t.exr");
+  EXPECT_EQ(image.width, 20);
+  EXPECT_EQ(image.height, 25);
+  EXPECT_EQ(image.channels.at("R").values, values);
+}
+
+TEST_F(ImageFileFormat, TruncatedFilesAreRefused) {
+  write_exr(folder_ / "a.exr", sample(9, 40));
+  const std::string bytes = bytes_of(folder_ / "a.exr");
+  for (std::size_t size = 0; size < bytes.size(); size += size < 600 ? 1 : 13) {
+    const auto path = put("t.exr", bytes.substr(0, size));
+    EXPECT_NE(error_of([&] { read_exr(path); }), "no error") << size;
+  }
+}
+
+TEST_F(ImageFileFormat, FlippedBitsNeverCrash) {
+  write_exr(folder_ / "a.exr", sample(9, 40));
+  const std::string bytes = bytes_of(folder_ / "a.exr");
+  int refused = 0;
+  for (std::size_t at = 0; at < bytes.size(); ++at) {
+    std::string flipped = bytes;
+    flipped[at] = static_cast<char>(flipped[at] ^ (1 << (at % 8)));
+    const auto path = put("t.exr", flipped);
+    refused += error_of([&] { read_exr(path); }) != "no error";
+  }
+  EXPECT_GT(refused, 100);
+}
+
+TEST_F(ImageFileFormat, GarbageAndAbsentFilesAreRefused) {
+  EXPECT_NE(error_of([&] { read_exr(folder_ / "none.exr"); }).find("none.exr: cannot read"),
+            std::string::npos);
+  EXPECT_NE(error_of([&] { read_exr(folder_); }), "no error");
+  EXPECT_NE(error_of([&] { read_exr(put("g.exr", std::string(4096, 'x'))); }).find("no OpenEXR file"),
+            std::string::npos);
+  EXPECT_NE(error_of([&] { read_exr(put("g.exr", "\x76\x2f\x31\x01\x02" + std::string(4096, '\x7f'))); }),
+            "no error");
+}
+
+TEST_F(ImageFileFormat, SizesAreCheckedBeforeMemoryIsTaken) {
+  write_exr(folder_ / "a.exr", sample(9, 40));
+  const std::string bytes = bytes_of(folder_ / "a.exr");
+  const std::string name("dataWindow\0box2i\0\x10\0\0\0", 21);
+  const std::size_t at = bytes.find(name) + name.size();
+  ASSERT_LT(at, bytes.size());
+  const auto with_window = [&](std::array<std::int32_t, 4> window) {
+    std::string patched = bytes;
+    std::memcpy(patched.data() + at, window.data(), 16);
+    const auto path = put("t.exr", patched);
+    return error_of([&] { read_exr(path); });
+  };
+  const std::int32_t big = std::numeric_limits<std::int32_t>::max();
+  EXPECT_EQ(with_window({0, 0, 8, 39}), "no error");
+  EXPECT_NE(with_window({0, 0, 16384, 39}).find("exceeds the maximum width"), std::string::npos);
+  EXPECT_NE(with_window({0, 0, big, big}), "no error");
+  EXPECT_NE(with_window({-big, -big, big, big}), "no error");
+  EXPECT_NE(with_window({0, 0, -1, -1}), "no error");
+  EXPECT_NE(with_window({0, 0, 16383, 16383}), "no error");
+  // The same number of blocks, so that their table is fine; 14 MB of pixels cannot come out of this file.
+  EXPECT_NE(with_window({0, 0, 16383, 39}).find("too short"), std::string::npos);
+
+  Imf::Header many(16384, 65);
+  for (int i = 0; i < 1024; ++i) many.channels().insert(std::to_string(i), Imf::Channel(Imf::FLOAT));
+  { Imf::OutputFile file((folder_ / "a.exr").c_str(), many); }
+  EXPECT_NE(error_of([&] { read_exr(folder_ / "a.exr"); }).find("1090519040 values (at most"),
+            std::string::npos);
+}
+
+TEST_F(ImageFileFormat, MultiPartDeepAndSubsampledFilesAreRefused) {
+  const auto path = folder_ / "m.exr";
+  Imf::Header part(4, 4);
+  part.channels().insert("R", Imf::Channel(Imf::HALF));
+  part.setType(Imf::SCANLINEIMAGE);
+  Imf::Header parts[2] = {part, part};
+  parts[0].setName("a");
+  parts[1].setName("b");
+  { Imf::MultiPartOutputFile file(path.c_str(), parts, 2); }
+  EXPECT_NE(error_of([&] { read_exr(path); }).find("deep and multi-part"), std::string::npos);
+
+  Imf::Header deep(4, 4);
+  deep.channels().insert("Z", Imf::Channel(Imf::FLOAT));
+  deep.setType(Imf::DEEPSCANLINE);
+  deep.compression() = Imf::ZIPS_COMPRESSION;
+  { Imf::DeepScanLineOutputFile file(path.c_str(), deep); }
+  EXPECT_NE(error_of([&] { read_exr(path); }).find("deep and multi-part"), std::string::npos);
+
+  Imf::Header subsampled(4, 4);
+  subsampled.channels().insert("R", Imf::Channel(Imf::FLOAT, 2, 2));
+  { Imf::OutputFile file(path.c_str(), subsampled); }
+  EXPECT_NE(error_of([&] { read_exr(path); }).find("channel R is subsampled"), std::string::npos);
+
+  Imf::Header unwritten(4, 4);
+  unwritten.channels().insert("R", Imf::Channel(Imf::FLOAT));
+  { Imf::OutputFile file(path.c_str(), unwritten); }
+  EXPECT_NE(error_of([&] { read_exr(path); }).find("incomplete"), std::string::npos);
+
+  Imf::Header many(1, 1);
+  for (int i = 0; i < 1025; ++i) many.channels().insert(std::to_string(i), Imf::Channel(Imf::FLOAT));
+  { Imf::OutputFile file(path.c_str(), many); }
+  EXPECT_NE(error_of([&] { read_exr(path); }).find("1025 channels"), std::string::npos);
+}
+
+TEST_F(ImageFileFormat, FailedWritesNameTheTarget) {
+  EXPECT_NE(error_of([&] { write_exr(folder_ / "no" / "a.exr", sample(2, 2)); }).find("a.exr"),
+            std::string::npos);
+  // A string cannot take the place of a standard attribute.
+  Image image = sample(2, 2);
+  image.metadata["compression"] = "none";
+  EXPECT_NE(error_of([&] { write_exr(folder_ / "a.exr", image); }).find("a.exr: cannot write"),
+            std::string::npos);
+  EXPECT_EQ(file_count(), 0u);
+}
+
+TEST_F(ImageFileFormat, PngRoundTripAndEqualBytes) {
+  const int width = 7;
+  const int height = 5;
+  std::vector<std::uint8_t> rgb;
+  for (int i = 0; i < 3 * width * height; ++i) rgb.push_back(static_cast<std::uint8_t>(i * 29));
+  write_png(folder_ / "a.png", width, height, rgb);
+  write_png(folder_ / "b.png", width, height, rgb);
+  EXPECT_EQ(bytes_of(folder_ / "a.png"), bytes_of(folder_ / "b.png"));
+
+  png_image image{};
+  image.version = PNG_IMAGE_VERSION;
+  ASSERT_NE(png_image_begin_read_from_file(&image, (folder_ / "a.png").c_str()), 0);
+  EXPECT_EQ(image.width, 7u);
+  EXPECT_EQ(image.height, 5u);
+  image.format = PNG_FORMAT_RGB;
+  std::vector<std::uint8_t> read(rgb.size());
+  ASSERT_NE(png_image_finish_read(&image, nullptr, read.data(), 0, nullptr), 0);
+  EXPECT_EQ(read, rgb);
+  EXPECT_NE(error_of([&] { write_png(folder_ / "no" / "a.png", width, height, rgb); }), "no error");
+}
+
+}  // namespace
+}  // namespace heddle

@@ -1,0 +1,138 @@
+#include "formats/obj_mesh.h"
+
+#include <cmath>
+
+#include "tests/formats/file_fixture.h"
+
+namespace heddle {
+namespace {
+
+class ObjMeshFormat : public FileFixture {
+ protected:
+  ObjMesh read(const std::string& text) const { return read_obj(put("m.obj", text)); }
+  void expect_refused(const std::string& text, const std::string& reason) const {
+    const std::string error = error_of([&] { read(text); });
+    EXPECT_NE(error.find(reason), std::string::npos) << "expected: " << reason << "\nfound: " << error;
+  }
+};
+
+constexpr const char* kThree = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+using Triangle = std::array<std::uint32_t, 3>;
+
+TEST_F(ObjMeshFormat, ReadsPositionsUvsAndNormals) {
+  const ObjMesh mesh = read(
+      "# comment\r\nv 0 0 0 # inline\r\nv 1.5 0 0 1 0 0\nv +0 1e0 -.5\n"
+      "vt 0 0\nvt 1 0 0\nvt 0 1\nvn 0 0 2\nf 1/1/1 2/2/1\t3/3/1\n");
+  EXPECT_EQ(mesh.positions, (std::vector<std::array<float, 3>>{{0, 0, 0}, {1.5f, 0, 0}, {0, 1, -0.5f}}));
+  EXPECT_EQ(mesh.uvs, (std::vector<std::array<float, 2>>{{0, 0}, {1, 0}, {0, 1}}));
+  EXPECT_EQ(mesh.normals, (std::vector<std::array<float, 3>>{{0, 0, 1}, {0, 0, 1}, {0, 0, 1}}));
+  EXPECT_EQ(mesh.triangles, (std::vector<Triangle>{{0, 1, 2}}));
+}
+
+TEST_F(ObjMeshFormat, OptionalPartsMayBeAbsent) {
+  const ObjMesh bare = read(std::string(kThree) + "f 1 2 3");
+  EXPECT_TRUE(bare.uvs.empty());
+  EXPECT_TRUE(bare.normals.empty());
+  const ObjMesh normals = read(std::string(kThree) + "vn 0 3 4\nf 1//1 2//1 3//1\n");
+  EXPECT_TRUE(normals.uvs.empty());
+  EXPECT_FLOAT_EQ(normals.normals[2][1], 0.6f);
+}
+
+TEST_F(ObjMeshFormat, PolygonsBecomeFans) {
+  const ObjMesh mesh = read("v 0 0 0\nv 1 0 0\nv 2 1 0\nv 1 2 0\nv 0 2 0\nf 1 2 3 4 5\n");
+  EXPECT_EQ(mesh.triangles, (std::vector<Triangle>{{0, 1, 2}, {0, 2, 3}, {0, 3, 4}}));
+}
+
+TEST_F(ObjMeshFormat, VerticesAreSharedWhereAllIndicesAgree) {
+  // The edge 2-3 is shared; a seam in the UVs splits vertex 3.
+  const ObjMesh mesh =
+      read("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 1\nf 1/1 2/1 3/1\nf 2/1 4/1 3/2\n");
+  EXPECT_EQ(mesh.positions.size(), 5u);
+  EXPECT_EQ(mesh.uvs.size(), 5u);
+  EXPECT_EQ(mesh.triangles, (std::vector<Triangle>{{0, 1, 2}, {1, 3, 4}}));
+}
+
+TEST_F(ObjMeshFormat, NegativeIndicesCountBack) {
+  const ObjMesh mesh = read(std::string(kThree) + "f -3 -2 -1\nv 5 5 5\nf -1 -2 -3\n");
+  EXPECT_EQ(mesh.triangles, (std::vector<Triangle>{{0, 1, 2}, {3, 2, 1}}));
+  EXPECT_EQ(mesh.positions[3][0], 5);
+}
+
+TEST_F(ObjMeshFormat, OtherLinesAreIgnored) {
+  const ObjMesh mesh =
+      read("mtllib /etc/passwd\nmtllib ../../secret.mtl\no name\ng a b\ns off\nusemtl none\n" +
+           std::string(kThree) + "vw 99999999999999999999 1\nvp 0 0\nl 1 2\nunknown nonsense\n\nf 1 2 3\n");
+  EXPECT_EQ(mesh.triangles.size(), 1u);
+}
+
+TEST_F(ObjMeshFormat, IndicesOutsideTheFileAreRefused) {
+  const std::string v = kThree;
+  expect_refused(v + "f 1 2 4\n", "m.obj:4: face 1: vertex 4 of 3");
+  expect_refused(v + "f 1 2 3\nf 1 2 999999\n", "m.obj:5: face 2: vertex 999999 of 3");
+  expect_refused(v + "f 1 2 0\n", "vertex 0 of 3");
+  expect_refused(v + "f 1 2 -4\n", "vertex -4 of 3");
+  expect_refused(v + "f 1 2 -2147483648\n", "vertex -2147483648 of 3");
+  expect_refused(v + "f 1 2 4294967297\n", "vertex 4294967297 of 3");
+  expect_refused(v + "f 1 2 99999999999999999999999\n", "of 3");
+  expect_refused(v + "f 1/1 2/1 3/1\n", "texture coordinate 1 of 0");
+  expect_refused(v + "vt 0 0\nf 1/1 2/1 3/-2\n", "texture coordinate -2 of 1");
+  expect_refused(v + "f 1//1 2//1 3//1\n", "normal 1 of 0");
+  // A vertex that comes later in the file does not exist yet.
+  expect_refused("v 0 0 0\nf 1 2 3\nv 1 0 0\nv 0 1 0\n", "m.obj:2: face 1: vertex 2 of 1");
+}
+
+TEST_F(ObjMeshFormat, NumbersMustBeFiniteAndComplete) {
+  for (const char* bad :
+       {"1e999", "-1e999", "inf", "nan", "1e39", "abc", "1.0x", "0x10", "", "--1", "+-1", "1,0"}) {
+    expect_refused(std::string(kThree) + "v 0 0 " + bad + "\nf 1 2 3\n",
+                   "m.obj:4: a vertex needs 3 finite numbers");
+    expect_refused(std::string(kThree) + "vt 0 " + bad + "\nf 1 2 3\n", "a texture coordinate needs 2");
+  }
+  expect_refused(std::string(kThree) + "vn 0 0 nan\nf 1 2 3\n", "a normal needs 3");
+  expect_refused(std::string(kThree) + "vn 0 0 0\nf 1 2 3\n", "normal of length 0");
+  EXPECT_NO_THROW(read(std::string(kThree) + "v 3.4e38 1e-50 -0\nf 1 2 3\n"));
+}
+
+TEST_F(ObjMeshFormat, MalformedFacesAreRefused) {
+  const std::string v = std::string(kThree) + "vt 0 0\nvn 0 0 1\n";
+  expect_refused(v + "f 1 2\n", "m.obj:6: face 1 has 2 corners");
+  expect_refused(v + "f 1\n", "face 1 has 1 corners");
+  expect_refused(v + "f\n", "face 1 has 0 corners");
+  expect_refused(v + "f 1 2 x\n", "'x' is no index");
+  expect_refused(v + "f 1 2 3.5\n", "'3.5' is no index");
+  expect_refused(v + "f 1 2 /1\n", "'' is no index");
+  expect_refused(v + "f 1 2 3/1/1/1\n", "more than three indices");
+}
+
+TEST_F(ObjMeshFormat, MixedAttributesAreRefused) {
+  const std::string v = std::string(kThree) + "vt 0 0\nvn 0 0 1\n";
+  expect_refused(v + "f 1/1 2/1 3\n", "m.obj:6: face 1: only some corners have UVs");
+  expect_refused(v + "f 1 2 3\nf 1/1 2/1 3/1\n", "m.obj:7: face 2: only some corners have UVs");
+  expect_refused(v + "f 1//1 2//1 3\n", "only some corners have normals");
+}
+
+TEST_F(ObjMeshFormat, EmptyMeshesAndAbsentFilesAreRefused) {
+  expect_refused("", "m.obj: no faces");
+  expect_refused(kThree, "no faces");
+  expect_refused(std::string(1000, '\0'), "no faces");
+  EXPECT_NE(error_of([&] { read_obj(folder_ / "none.obj"); }).find("none.obj: cannot open"),
+            std::string::npos);
+}
+
+TEST_F(ObjMeshFormat, EveryTruncationEndsInAMeshOrAnError) {
+  const std::string text =
+      "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\nf 1/1/1 2/1/1 3/1/1 4/1/1\nf -1/-1/-1 1/1/1 "
+      "2/1/1\n";
+  for (std::size_t size = 0; size < text.size(); ++size) {
+    try {
+      const ObjMesh mesh = read(text.substr(0, size));
+      for (const Triangle& triangle : mesh.triangles) {
+        for (const std::uint32_t vertex : triangle) EXPECT_LT(vertex, mesh.positions.size());
+      }
+    } catch (const FileError&) {
+    }
+  }
+}
+
+}  // namespace
+}  // namespace heddle
