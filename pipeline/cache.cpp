@@ -15,12 +15,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-void make_folder(const fs::path& folder) {
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (error) throw FileError(fmt::format("{}: cannot create the folder: {}", folder.string(), error.message()));
-}
-
 /// Makes renames inside `folder` durable.
 void flush_folder(const fs::path& folder) {
   const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
@@ -30,6 +24,13 @@ void flush_folder(const fs::path& folder) {
 }
 
 }  // namespace
+
+void make_folder(const fs::path& folder) {
+  if (folder.empty()) return;
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) throw FileError(fmt::format("{}: cannot create the folder: {}", folder.string(), error.message()));
+}
 
 fs::path default_cache_folder() {
   const char* from_environment = std::getenv("HEDDLE_CACHE");

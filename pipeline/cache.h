@@ -22,6 +22,9 @@ namespace heddle {
 
 std::filesystem::path default_cache_folder();
 
+/// Creates a folder and those above it; nothing to do for an empty path (the working directory).
+void make_folder(const std::filesystem::path& folder);
+
 /// What a stage's artifact depends on. Order matters; names keep neighbouring values apart.
 struct StageInputs {
   std::string stage;

@@ -58,9 +58,12 @@ Report describe_fabric(const fs::path& path, const CommonOptions& common) {
 Report describe_scene(const TomlTable& document) {
   const SceneConfig scene = read_scene_config(document);
   Report report = {{"kind", "scene config"}, {"name", scene.name}};
-  report["resolution_px"] = {scene.camera.width, scene.camera.height};
+  for (const ViewConfig& view : scene.views) {
+    report["view." + (view.name.empty() ? std::string("camera") : view.name)] =
+        fmt::format("{} x {} pixels, {} samples per pixel{}", view.camera.width, view.camera.height, view.spp,
+                    view.reference ? ", with a path-traced reference" : "");
+  }
   report["method"] = render_method_name(scene.method);
-  report["samples_per_pixel"] = scene.spp;
   report["lights"] = scene.lights.size();
   Report fabrics = Report::array();
   for (const ClothConfig& cloth : scene.cloths) fabrics.push_back(cloth.fabric.string());

@@ -1,7 +1,5 @@
-#include <fmt/format.h>
-
-#include "formats/atomic_file.h"
 #include "fibers/baked/fabric_pack.h"
+#include "formats/atomic_file.h"
 #include "formats/input_error.h"
 #include "pipeline/commands.h"
 #include "pipeline/job.h"
@@ -17,8 +15,7 @@ void copy_pack(const fs::path& from, const fs::path& to) {
   if (fs::exists(to) && !fs::is_empty(to, error) && !fs::exists(to / kManifestName)) {
     throw FileError(to.string() + ": exists and is not a pack; remove it or choose another name");
   }
-  fs::create_directories(to, error);
-  if (error) throw FileError(fmt::format("{}: cannot create the folder: {}", to.string(), error.message()));
+  make_folder(to);
   for (const auto& [name, file] : read_verified_manifest(from).files) {
     write_file_atomically(to / name, read_whole_file(from / name));
   }

@@ -16,6 +16,9 @@
 #include "formats/tensor_file.h"
 #include "pipeline/interrupt.h"
 #include "pipeline/version.h"
+#include "precompute/sg_fit.h"
+#include "precompute/ssdf_fit.h"
+#include "precompute/visibility_maps.h"
 
 namespace heddle {
 namespace {
@@ -67,7 +70,8 @@ FabricDocument read_fabric_document(const fs::path& path, std::optional<std::uin
   fabric.file = path;
   fabric.config = read_fabric_config(document);
   if (seed) fabric.config.seed = *seed;
-  fabric.visibility = read_visibility_settings(document.table("visibility"));
+  fabric.visibility = read_visibility_settings(document.table("visibility"), fabric.config.light_from_both_sides);
+  fabric.visibility.seed = fabric.config.seed;
   fabric.transfer = read_transfer_settings(document.table("transfer"));
   fabric.transfer.both_sides = fabric.config.light_from_both_sides;
   fabric.transfer.seed = fabric.config.seed;
@@ -112,14 +116,14 @@ FabricStages::Stage FabricStages::make_stage(std::string name, int version, std:
   return stage;
 }
 
-void FabricStages::report(StageResult result) {
-  for (const StageResult& earlier : context_->results) {
+void StageContext::report(StageResult result) {
+  for (const StageResult& earlier : results) {
     if (earlier.stage == result.stage && earlier.key == result.key) return;
   }
   std::string how = result.built ? fmt::format("built in {}", duration_text(result.seconds)) : "cached";
   if (result.resumed > 0) how += fmt::format(", {} chunks were already done", result.resumed);
-  context_->console->say(fmt::format("{:<12} {:<9} {}", document_.config.name, result.stage, how));
-  context_->results.push_back(std::move(result));
+  console->say(fmt::format("{}: {:<9} {}", result.fabric, result.stage, how));
+  results.push_back(std::move(result));
 }
 
 /// build(path, result) writes the artifact, atomically, where the cache lacks it.
@@ -135,7 +139,7 @@ Artifact FabricStages::artifact_of(const Stage& stage, Build&& build) {
     result.built = true;
     result.seconds = std::chrono::duration<double>(Clock::now() - start).count();
   }
-  report(std::move(result));
+  context_->report(std::move(result));
   return artifact;
 }
 
@@ -211,6 +215,83 @@ void FabricStages::read_chunks(const Stage& stage, std::uint32_t items, std::uin
   }
 }
 
+/// A shard's own line in the report; nothing is published.
+template <class Work>
+void FabricStages::run_shard(const Stage& stage, Work&& work) {
+  StageResult result{.fabric = document_.config.name, .stage = stage.name, .key = stage.key,
+                     .artifact = context_->cache.artifact(stage.name, stage.key, stage.extension)};
+  if (!fs::exists(result.artifact)) {
+    const Clock::time_point start = Clock::now();
+    work(result);
+    result.built = result.chunks > 0;
+    result.seconds = std::chrono::duration<double>(Clock::now() - start).count();
+  }
+  context_->report(std::move(result));
+}
+
+// Maps do not depend on [visibility], which says how they are compressed.
+FabricStages::Stage FabricStages::maps_stage() {
+  return make_stage("maps", 1, ".safetensors", "", {{"geometry", geometry_key()}, {"light_from", light_from()}});
+}
+
+/// Computes one chunk of maps.
+void FabricStages::compute_maps(const Stage& stage, const fs::path& file, std::uint32_t first, std::uint32_t end) {
+  write_visibility_maps(file, bake_visibility_maps(scene(), document_.config.light_from_both_sides, first, end),
+                        stage.metadata);
+}
+
+Artifact FabricStages::maps() {
+  const Stage stage = maps_stage();
+  return artifact_of(stage, [&](const fs::path& path, StageResult& result) {
+    const auto segments = static_cast<std::uint32_t>(exemplar().segment_count());
+    const auto compute = [&](const fs::path& file, std::uint32_t first, std::uint32_t end) {
+      compute_maps(stage, file, first, end);
+    };
+    finish_chunks(stage, segments, kSegmentsPerChunk, "segments", Shard{}, result, compute);
+    VisibilityMaps all;
+    all.both_sides = document_.config.light_from_both_sides;
+    read_chunks(stage, segments, kSegmentsPerChunk, compute, [&](const fs::path& file, std::uint32_t first, std::uint32_t end) {
+      const VisibilityMaps chunk = read_visibility_maps(file);
+      if (chunk.first_segment != first || chunk.count() != end - first || chunk.both_sides != all.both_sides) {
+        throw FileError(file.string() + ": not the chunk that its name says");
+      }
+      all.words.insert(all.words.end(), chunk.words.begin(), chunk.words.end());
+      all.sees_nothing.insert(all.sees_nothing.end(), chunk.sees_nothing.begin(), chunk.sees_nothing.end());
+    });
+    write_visibility_maps(path, all, stage.metadata);
+    PartialChunks(context_->cache, stage.name, stage.key).remove();
+  });
+}
+
+void FabricStages::visibility_shard(Shard shard) {
+  const Stage stage = maps_stage();
+  run_shard(stage, [&](StageResult& result) {
+    finish_chunks(stage, static_cast<std::uint32_t>(exemplar().segment_count()), kSegmentsPerChunk, "segments", shard, result,
+                  [&](const fs::path& file, std::uint32_t first, std::uint32_t end) { compute_maps(stage, file, first, end); });
+  });
+}
+
+FabricStages::Stage FabricStages::fit_stage(const std::string& name, int version) {
+  return make_stage(name, version, ".safetensors", document_.visibility_text,
+                    {{"maps", maps_stage().key}, {"seed", fmt::format("{}", document_.config.seed)}});
+}
+
+Artifact FabricStages::ssdf() {
+  const Stage stage = fit_stage("ssdf", 1);
+  return artifact_of(stage, [&](const fs::path& path, StageResult&) {
+    write_ssdf(path, fit_ssdf(read_visibility_maps(maps().path), document_.visibility), stage.metadata);
+  });
+}
+
+Artifact FabricStages::sgs() {
+  const Stage stage = fit_stage("sg", 1);
+  return artifact_of(stage, [&](const fs::path& path, StageResult&) {
+    write_sg_visibility(path, fit_sg_visibility(read_visibility_maps(maps().path), document_.visibility), stage.metadata);
+  });
+}
+
+const char* FabricStages::light_from() const { return document_.config.light_from_both_sides ? "both" : "face"; }
+
 TransferSettings FabricStages::transfer_settings(std::optional<int> order) const {
   TransferSettings settings = document_.transfer;
   if (order) settings.order = *order;
@@ -221,7 +302,7 @@ FabricStages::Stage FabricStages::transfer_stage(const TransferSettings& setting
   return make_stage("transfer", 1, ".safetensors", document_.transfer_text,
                     {{"fibers", synth().key},
                      {"order", fmt::format("{}", settings.order)},
-                     {"light_from", settings.both_sides ? "both" : "face"},
+                     {"light_from", light_from()},
                      {"seed", fmt::format("{}", settings.seed)}});
 }
 
@@ -284,7 +365,7 @@ Artifact FabricStages::pack(const Needs& needs) {
 
   std::vector<std::pair<std::string, std::string>> upstream;
   for (const auto& [file, artifact] : parts) upstream.emplace_back(file, artifact.key);
-  upstream.emplace_back("light_from", document_.config.light_from_both_sides ? "both" : "face");
+  upstream.emplace_back("light_from", light_from());
   const Stage stage = make_stage("pack", 1, "", document_.config.name, std::move(upstream));
   return artifact_of(stage, [&](const fs::path&, StageResult&) {
     context_->cache.publish_folder("pack", stage.key, [&](const fs::path& folder) {
@@ -304,24 +385,10 @@ Artifact FabricStages::pack(const Needs& needs) {
   });
 }
 
-/// A shard's own line in the report; nothing is published.
-template <class Work>
-void FabricStages::run_shard(const Stage& stage, Shard shard, Work&& work) {
-  StageResult result{.fabric = document_.config.name, .stage = stage.name, .key = stage.key,
-                     .artifact = context_->cache.artifact(stage.name, stage.key, stage.extension)};
-  if (!fs::exists(result.artifact)) {
-    const Clock::time_point start = Clock::now();
-    work(result);
-    result.built = result.chunks > 0;
-    result.seconds = std::chrono::duration<double>(Clock::now() - start).count();
-  }
-  report(std::move(result));
-}
-
 void FabricStages::transfer_shard(std::optional<int> order, Shard shard) {
   const TransferSettings settings = transfer_settings(order);
   const Stage stage = transfer_stage(settings);
-  run_shard(stage, shard, [&](StageResult& result) {
+  run_shard(stage, [&](StageResult& result) {
     const auto work = transfer_work(settings);
     finish_chunks(stage, work->baker->cell_count(), kCellsPerChunk, "cells", shard, result,
                   [&](const fs::path& file, std::uint32_t first, std::uint32_t end) { work->compute(file, first, end); });

@@ -5,9 +5,9 @@
 // does not ask for (directly or through what it asks for).
 //
 //   synth       config without the sections below           fibers.safetensors       Exemplar
-//   maps        geometry, [visibility]   in chunks          maps.safetensors         visibility bits per segment
+//   maps        geometry, light_from         in chunks      maps.safetensors         VisibilityMaps
 //   ssdf        maps, [visibility]                          ssdf.safetensors         SsdfVisibility
-//   sg          maps, [visibility], light_from              sg.safetensors           SgVisibility
+//   sg          maps, [visibility]                          sg.safetensors           SgVisibility
 //   transfer    fibers, [transfer], light_from   in chunks  transfer.safetensors     Transfer
 //   voxelize    geometry, [volume]                          volume.vdb               IdVolume
 //   pack        what the pack is to hold                    folder                   FabricPack
@@ -70,6 +70,9 @@ struct StageContext {
   Console* console;
   std::optional<std::uint64_t> seed;  // in place of the fabric's
   std::vector<StageResult> results;
+
+  /// Says how a stage went, once per key, and notes it for the report.
+  void report(StageResult result);
 };
 
 /// A fabric file, read and checked.
@@ -123,9 +126,7 @@ class FabricStages {
   template <class Build>
   Artifact artifact_of(const Stage& stage, Build&& build);
   template <class Work>
-  void run_shard(const Stage& stage, Shard shard, Work&& work);
-  void report(StageResult result);
-
+  void run_shard(const Stage& stage, Work&& work);
   /// compute(file, first, end) for those of the shard's chunks that are not on disk.
   template <class Compute>
   void finish_chunks(const Stage& stage, std::uint32_t items, std::uint32_t per_chunk, const std::string& unit, Shard shard,
@@ -136,8 +137,11 @@ class FabricStages {
   const Exemplar& exemplar();
   const TileScene& scene();
   const std::string& geometry_key();
+  const char* light_from() const;
   Stage maps_stage();
   Artifact maps();
+  void compute_maps(const Stage& stage, const std::filesystem::path& file, std::uint32_t first, std::uint32_t end);
+  Stage fit_stage(const std::string& name, int version);
   TransferSettings transfer_settings(std::optional<int> order) const;
   Stage transfer_stage(const TransferSettings& settings);
   std::unique_ptr<TransferWork> transfer_work(const TransferSettings& settings);
