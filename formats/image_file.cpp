@@ -41,7 +41,7 @@ Imf::PixelType pixel_type(ChannelType type) {
   }
 }
 
-/// Half and lossless deflate-like methods, whose output size is bounded by a multiple of the input size.
+/// Methods whose output is at most kMaxDeflateRatio times as long as their input.
 bool is_deflate_like(Imf::Compression compression) {
   return compression == Imf::NO_COMPRESSION || compression == Imf::RLE_COMPRESSION ||
          compression == Imf::ZIPS_COMPRESSION || compression == Imf::ZIP_COMPRESSION ||

@@ -519,7 +519,7 @@ std::filesystem::path TomlTable::existing_file(std::string_view key) const {
   if (value == nullptr) document_->fail_missing(*node_, key, "the path of a file");
   const auto* text = value->as_string();
   if (text == nullptr) document_->fail_wrong_value(key, *value, "the path of a file");
-  const std::filesystem::path path = std::filesystem::path(document_->name).parent_path() / text->get();
+  std::filesystem::path path = std::filesystem::path(document_->name).parent_path() / text->get();
   std::error_code ignored;
   if (!std::filesystem::is_regular_file(path, ignored)) {
     document_->fail_at(value->source().begin, fmt::format("'{}': there is no file '{}'", key, path.string()));

@@ -2,6 +2,7 @@
 
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
 #include <cassert>
 #include <cmath>
 
@@ -37,16 +38,41 @@ TransferSettings read_transfer_settings(const TomlTable& section) {
   return settings;
 }
 
+std::vector<float> segment_openness(const TileScene& scene, bool both_sides, std::uint64_t seed) {
+  constexpr int kGrid = 8;
+  const Exemplar& exemplar = scene.exemplar();
+  std::vector<float> openness(exemplar.segment_count());
+  tbb::parallel_for(std::size_t{0}, openness.size(), [&](std::size_t s) {
+    const auto segment = static_cast<std::uint32_t>(s);
+    RandomStream random(seed, RandomStage::kOpenness, s, 0);
+    int open = 0;
+    for (int i = 0; i < kGrid * kGrid; ++i) {
+      const float share = (static_cast<float>(i / kGrid) + random.uniform()) / kGrid;
+      const float phi = 2 * kPif * (static_cast<float>(i % kGrid) + random.uniform()) / kGrid;
+      const float z = both_sides ? 1 - 2 * share : 1 - share;
+      const float r = std::sqrt(std::max(0.0F, 1 - z * z));
+      const Vec3 direction(r * std::cos(phi), r * std::sin(phi), z);
+      if (!scene.occluded({exemplar.segment_midpoint(segment), direction}, exemplar.segment_fiber[segment])) ++open;
+    }
+    openness[s] = static_cast<float>(open) / (kGrid * kGrid) + kLeastOpenness;
+  });
+  return openness;
+}
+
 TransferBaker::TransferBaker(const TileScene& scene, std::span<const BcsdfTable> materials,
                              const TransferSettings& settings, const CellGrid& grid)
-    : scene_(&scene), materials_(materials), settings_(settings), grid_(grid), segments_of_cell_(grid.count()) {
+    : scene_(&scene), materials_(materials), settings_(settings), grid_(grid), cells_(grid.count()) {
+  const std::vector<float> openness = segment_openness(scene, settings.both_sides, settings.seed);
   for (std::uint32_t s = 0; s < scene.exemplar().segment_count(); ++s) {
-    segments_of_cell_[grid_.cell_of(scene.exemplar().segment_midpoint(s))].push_back(s);
+    CellSegments& cell = cells_[grid_.cell_of(scene.exemplar().segment_midpoint(s))];
+    const double before = cell.segment.empty() ? 0.0 : cell.cumulative_openness.back();
+    cell.segment.push_back(s);
+    cell.cumulative_openness.push_back(before + openness[s]);
   }
 }
 
 void TransferBaker::bake_cell(std::uint32_t cell, float* matrix, float* standard_error, std::uint32_t* paths) const {
-  const std::vector<std::uint32_t>& segments = segments_of_cell_[cell];
+  const auto& [segments, cumulative_openness] = cells_[cell];
   *paths = 0;
   if (segments.empty()) return;
   const int n = (settings_.order + 1) * (settings_.order + 1);
@@ -66,7 +92,9 @@ void TransferBaker::bake_cell(std::uint32_t cell, float* matrix, float* standard
       const auto path = static_cast<std::uint64_t>(batches) * kBatch + static_cast<std::uint64_t>(i);
       RandomStream random(settings_.seed, RandomStage::kTransfer, cell, path);
       const double share = std::fmod((static_cast<double>(path) + 0.5) * kGoldenShare, 1.0);
-      const std::uint32_t segment = segments[static_cast<std::size_t>(share * static_cast<double>(segments.size()))];
+      const auto chosen = std::upper_bound(cumulative_openness.begin(), cumulative_openness.end() - 1,
+                                           share * cumulative_openness.back());
+      const std::uint32_t segment = segments[static_cast<std::size_t>(chosen - cumulative_openness.begin())];
       const float z = 1 - 2 * (static_cast<float>(i / kStrata) + random.uniform()) / kStrata;
       const float phi = 2 * kPif * (static_cast<float>(i % kStrata) + random.uniform()) / kStrata;
       const float r = std::sqrt(std::max(0.0F, 1 - z * z));

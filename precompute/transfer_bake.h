@@ -7,6 +7,8 @@
 // Light from the face only: paths that leave with w0.z <= 0 are dropped. One path so serves every light direction, where
 // the estimator of Khungurn 2017, section 4.2 (w0 and w1 both uniform) serves one and pays for narrow lobes with noise;
 // tests/bench/transfer_estimators.cpp holds both.
+// Within a cell, segments are chosen by their openness, the share of the sky they see: the cell's matrix is the mean over what
+// an eye can see of the cell, not over all it holds. The paper's plain mean mixes hidden segments in and darkens large cells.
 // Paths come in batches, stratified over w1 and over the cell's segments; the spread of the batch means gives the
 // standard error, and a cell is done when its error meets the target.
 // Cells are independent and draw from (seed, cell, path), so any range of cells can be baked alone, by any number of
@@ -35,6 +37,11 @@ struct TransferSettings {
 
 /// Reads the section [transfer]; both_sides and seed are the fabric's.
 TransferSettings read_transfer_settings(const TomlTable& section);
+
+/// Share of the sky that each segment sees from its midpoint (own fiber ignored): of the face's hemisphere, or of the whole
+/// sphere; from 64 stratified rays, plus kLeastOpenness so that hidden segments are only rarely, not never, chosen.
+inline constexpr float kLeastOpenness = 1e-3F;
+std::vector<float> segment_openness(const TileScene& scene, bool both_sides, std::uint64_t seed);
 
 struct TransferChunk {
   std::uint32_t first_cell = 0;
@@ -65,7 +72,11 @@ class TransferBaker {
   std::span<const BcsdfTable> materials_;
   TransferSettings settings_;
   CellGrid grid_;
-  std::vector<std::vector<std::uint32_t>> segments_of_cell_;  // [cell] segments whose midpoint lies in it
+  struct CellSegments {
+    std::vector<std::uint32_t> segment;       // whose midpoint lies in the cell
+    std::vector<double> cumulative_openness;  // running sum
+  };
+  std::vector<CellSegments> cells_;  // [cell]
 };
 
 }  // namespace heddle

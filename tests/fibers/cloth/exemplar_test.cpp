@@ -1,0 +1,61 @@
+#include "fibers/cloth/exemplar.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <functional>
+
+#include "fibers/cloth/synthesize.h"
+#include "formats/input_error.h"
+#include "tests/support/fabrics.h"
+
+namespace heddle {
+namespace {
+
+TEST(ExemplarFormat, RoundTripKeepsEveryBit) {
+  const Exemplar a = synthesize(test::small_fabric());
+  const std::filesystem::path path = std::filesystem::temp_directory_path() / "heddle_exemplar_test.safetensors";
+  write_exemplar(path, a, {{"key", "k"}});
+  const Exemplar b = read_exemplar(path);
+  std::filesystem::remove(path);
+  EXPECT_EQ(a.points, b.points);
+  EXPECT_EQ(a.first_point, b.first_point);
+  EXPECT_EQ(a.radius_mm, b.radius_mm);
+  EXPECT_EQ(a.material, b.material);
+  EXPECT_EQ(a.segment_point, b.segment_point);
+  EXPECT_EQ(a.z_max, b.z_max);
+  EXPECT_EQ(a.scattering[0].beta_tt, b.scattering[0].beta_tt);
+  EXPECT_TRUE((a.scattering[0].color_tt == b.scattering[0].color_tt).all());
+}
+
+TEST(ExemplarFormat, EachBrokenInvariantIsNamed) {
+  const Exemplar good = test::straight_fibers(1, 1, {{0.3F, 0}, {0.6F, 0.1F}}, 0.02F, 4, test::white_fiber());
+  EXPECT_NO_THROW(validate_exemplar(good, "good"));
+  const std::vector<std::pair<int, std::function<void(Exemplar&)>>> breakages = {
+      {1, [](Exemplar& e) { e.first_point[1] = 2; }},
+      {1, [](Exemplar& e) { e.points.pop_back(); }},
+      {1, [](Exemplar& e) { e.first_point[1] = 4000000000U; }},
+      {2, [](Exemplar& e) { e.points[3].z() = std::numeric_limits<float>::quiet_NaN(); }},
+      {2, [](Exemplar& e) { e.radius_mm[1] = 0; }},
+      {2, [](Exemplar& e) { e.radius_mm[0] = 0.6F; }},
+      {2, [](Exemplar& e) { e.width_mm = -1; }},
+      {3, [](Exemplar& e) { e.points[4].y() += 0.01F; }},
+      {4, [](Exemplar& e) { e.points[2] = e.points[1]; }},
+      {5, [](Exemplar& e) { e.material[1] = 1; }},
+  };
+  for (const auto& [invariant, breakage] : breakages) {
+    Exemplar bad = good;
+    breakage(bad);
+    try {
+      validate_exemplar(bad, "bad.safetensors");
+      ADD_FAILURE() << "invariant " << invariant << " was not checked";
+    } catch (const FileError& error) {
+      EXPECT_NE(std::string(error.what()).find("bad.safetensors: invariant " + std::to_string(invariant)),
+                std::string::npos)
+          << error.what();
+    }
+  }
+}
+
+}  // namespace
+}  // namespace heddle

@@ -1,0 +1,102 @@
+#include "fibers/cloth/fibers_of_yarn.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/support/fabrics.h"
+
+namespace heddle {
+namespace {
+
+YarnPath flat_yarn(double length_mm) { return {false, 0.5, length_mm / 4, {0, 0, 0, 0}}; }
+
+YarnConfig yarn_of(int plies, int fibers, double wander_deg) {
+  YarnConfig yarn;
+  yarn.spacing_mm = 1;
+  yarn.width_mm = 0.4;
+  yarn.height_mm = 0.2;
+  yarn.plies = plies;
+  yarn.fibers_per_ply = fibers;
+  yarn.wander_rms = radians(wander_deg);
+  return yarn;
+}
+
+Exemplar fibers_of(const YarnConfig& yarn, double length_mm, double segment_mm, std::uint64_t seed = 1) {
+  Exemplar exemplar;
+  exemplar.width_mm = static_cast<float>(length_mm);
+  exemplar.height_mm = 1;
+  exemplar.first_point = {0};
+  exemplar.scattering = {test::white_fiber()};
+  add_fibers_of_yarn(yarn, 0.005, flat_yarn(length_mm), segment_mm, seed, 0, exemplar);
+  index_segments(exemplar);
+  return exemplar;
+}
+
+TEST(FibersOfYarnLaw, NoFiberLeavesItsYarn) {
+  for (int plies : {1, 2, 3, 5}) {
+    YarnConfig yarn = yarn_of(plies, 20, 10);
+    yarn.ply_turns_per_mm = 1.3;
+    yarn.yarn_turns_per_mm = -0.7;
+    yarn.migration = 0.5;
+    const Exemplar exemplar = fibers_of(yarn, 3, 0.02);
+    for (const Vec3& p : exemplar.points) {
+      const double across = std::hypot((p.y() - 0.5) / (0.5 * yarn.width_mm - 0.005), p.z() / (0.5 * yarn.height_mm - 0.005));
+      EXPECT_LE(across, 1 + 1e-4) << plies;
+    }
+  }
+}
+
+TEST(FibersOfYarnLaw, EveryFiberContinuesInTheNextTile) {
+  YarnConfig yarn = yarn_of(2, 9, 6);
+  yarn.ply_turns_per_mm = 0.9;
+  yarn.yarn_turns_per_mm = 0.4;
+  const Exemplar exemplar = fibers_of(yarn, 2.5, 0.03);
+  ASSERT_EQ(exemplar.fiber_count(), 18U);
+  EXPECT_NO_THROW(validate_exemplar(exemplar, "fibers"));
+}
+
+// A twist of whole turns: a helix of radius R and N turns over length L climbs at atan(2 pi R N / L).
+TEST(FibersOfYarnLaw, TwistGivesTheAngleOfAHelix) {
+  YarnConfig yarn = yarn_of(1, 400, 0);
+  yarn.width_mm = yarn.height_mm = 0.4;
+  yarn.ply_turns_per_mm = 2;
+  const Exemplar exemplar = fibers_of(yarn, 2, 0.005);
+  ASSERT_EQ(snap_twist(yarn, 2).ply_turns, 4);
+  for (std::uint32_t s = 0; s < exemplar.segment_count(); s += 97) {
+    const Vec3 m = exemplar.segment_midpoint(s);
+    const double radius = std::hypot(m.y() - 0.5, m.z());
+    const double expected = std::atan(2 * kPi * radius * 2);
+    EXPECT_NEAR(std::acos(exemplar.segment_tangent(s).x()), expected, 0.01) << radius;
+  }
+}
+
+// Slopes are sums of modes with the stated rms; the few fibers that meet the yarn's edge are held back there, which can
+// only lower it.
+TEST(FibersOfYarnStatistical, WanderHasTheStatedRmsAngle) {
+  for (double asked : {1.0, 3.0, 6.0}) {
+    YarnConfig yarn = yarn_of(1, 300, asked);
+    yarn.width_mm = yarn.height_mm = 2;  // little edge
+    const Exemplar exemplar = fibers_of(yarn, 4, 0.01);
+    double sum = 0;
+    for (std::uint32_t s = 0; s < exemplar.segment_count(); ++s) {
+      const Vec3 t = exemplar.segment_tangent(s);
+      const double slope = std::hypot(t.y(), t.z()) / t.x();
+      sum += slope * slope;
+    }
+    const double measured = degrees(std::atan(std::sqrt(sum / static_cast<double>(exemplar.segment_count()))));
+    EXPECT_NEAR(measured, asked, 0.05 * asked);
+  }
+}
+
+TEST(FibersOfYarnLaw, SameSeedSameFibersOtherSeedOtherFibers) {
+  const YarnConfig yarn = yarn_of(2, 5, 4);
+  const Exemplar a = fibers_of(yarn, 2, 0.05, 1);
+  const Exemplar b = fibers_of(yarn, 2, 0.05, 1);
+  const Exemplar c = fibers_of(yarn, 2, 0.05, 2);
+  EXPECT_EQ(a.points, b.points);
+  EXPECT_NE(a.points, c.points);
+}
+
+}  // namespace
+}  // namespace heddle

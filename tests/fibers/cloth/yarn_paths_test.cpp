@@ -1,0 +1,56 @@
+#include "fibers/cloth/yarn_paths.h"
+
+#include <gtest/gtest.h>
+
+#include <stdexcept>
+
+#include "tests/support/fabrics.h"
+
+namespace heddle {
+namespace {
+
+TEST(YarnPathsLaw, NoTwoYarnsOverlapAndTheTightestTouch) {
+  for (const char* notation : {"plain", "twill 2/2", "twill 3/1", "satin 5/2", "satin 8/3"}) {
+    const FabricConfig config = test::small_fabric(notation);
+    const YarnPaths paths = lay_yarns(config);
+    // A grid finer than and incommensurate with the one that solved for the crests.
+    const double clearance = smallest_clearance(config, paths, 151);
+    EXPECT_GE(clearance, 0) << notation;
+    EXPECT_LT(clearance, 0.01 * config.warp.height_mm) << notation << ": the crests are taller than they need to be";
+  }
+}
+
+TEST(YarnPathsLaw, CrestsGoOverAndUnderAsTheWeaveSays) {
+  const FabricConfig config = test::small_fabric("twill 2/2");
+  const YarnPaths paths = lay_yarns(config);
+  for (std::size_t end = 0; end < paths.warp.size(); ++end) {
+    for (std::size_t pick = 0; pick < paths.weft.size(); ++pick) {
+      const double gap = paths.warp[end].height_at(paths.weft[pick].across_mm) -
+                         paths.weft[pick].height_at(paths.warp[end].across_mm);
+      EXPECT_EQ(gap > 0, config.weave.is_warp_up(static_cast<int>(end), static_cast<int>(pick)));
+    }
+  }
+}
+
+TEST(YarnPathsLaw, HeightIsPeriodicAndSmooth) {
+  const YarnPaths paths = lay_yarns(test::small_fabric("satin 5/2"));
+  const YarnPath& yarn = paths.warp[1];
+  const double step = 1e-5;
+  for (double s = -1; s < 2; s += 0.0137) {
+    EXPECT_NEAR(yarn.height_at(s), yarn.height_at(s + yarn.length_mm()), 1e-12);
+    // One derivative from either side; the second derivative is below crest (pi / spacing)^2.
+    const double left = (yarn.height_at(s) - yarn.height_at(s - step)) / step;
+    const double right = (yarn.height_at(s + step) - yarn.height_at(s)) / step;
+    EXPECT_NEAR(left, right, 110 * 0.2 * step);
+  }
+}
+
+TEST(YarnPaths, YarnsTooWideToPassAreRefused) {
+  FabricConfig config = test::small_fabric();
+  config.warp.width_mm = config.warp.spacing_mm;
+  config.weft.width_mm = config.weft.spacing_mm;
+  EXPECT_THROW(lay_yarns(config), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace heddle

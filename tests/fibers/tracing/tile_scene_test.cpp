@@ -1,0 +1,161 @@
+#include "fibers/tracing/tile_scene.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "fibers/cloth/synthesize.h"
+#include "fibers/math/random.h"
+#include "fibers/math/sampling.h"
+#include "tests/support/fabrics.h"
+
+namespace heddle {
+namespace {
+
+// First hit with the capsule of a segment (both ends rounded), t of the ray; negative where there is none.
+double intersect_capsule(const Vec3d& o, const Vec3d& d, const Vec3d& a, const Vec3d& b, double r) {
+  const Vec3d axis = (b - a).normalized();
+  const double length = (b - a).norm();
+  double best = -1;
+  auto offer = [&](double t, bool on_side) {
+    if (!(t >= 0) || (best >= 0 && t >= best)) return;
+    const double along = (o + t * d - a).dot(axis);
+    if (!on_side || (along >= 0 && along <= length)) best = t;
+  };
+  auto roots = [&](const Vec3d& p, const Vec3d& q, bool on_side) {
+    const double aa = q.squaredNorm();
+    const double bb = p.dot(q);
+    const double disc = bb * bb - aa * (p.squaredNorm() - r * r);
+    if (disc < 0 || aa == 0) return;
+    offer((-bb - std::sqrt(disc)) / aa, on_side);
+  };
+  const Vec3d p = o - a;
+  roots(p - p.dot(axis) * axis, d - d.dot(axis) * axis, true);
+  roots(o - a, d, false);
+  roots(o - b, d, false);
+  return best;
+}
+
+// Brute force over explicit copies of the tile.
+double first_hit_by_hand(const Exemplar& e, const Ray& ray, std::uint32_t own_fiber, int copies) {
+  double best = -1;
+  for (std::uint32_t s = 0; s < e.segment_count(); ++s) {
+    if (e.segment_fiber[s] == own_fiber) continue;
+    for (int j = -copies; j <= copies; ++j) {
+      for (int i = -copies; i <= copies; ++i) {
+        const Vec3d shift(i * static_cast<double>(e.width_mm), j * static_cast<double>(e.height_mm), 0);
+        const double t = intersect_capsule(ray.origin.cast<double>(), ray.direction.cast<double>(),
+                                           e.points[e.segment_point[s]].cast<double>() + shift,
+                                           e.points[e.segment_point[s] + 1].cast<double>() + shift,
+                                           e.radius_mm[e.segment_fiber[s]]);
+        if (t >= 0 && (best < 0 || t < best)) best = t;
+      }
+    }
+  }
+  return best;
+}
+
+TEST(TileSceneAgreement, EyeRaysAgreeWithBruteForceOverCopies) {
+  const TileScene scene(synthesize(test::small_fabric()));
+  const Exemplar& e = scene.exemplar();
+  int hits = 0;
+  for (int i = 0; i < 600; ++i) {
+    RandomStream random(1, RandomStage::kTest, 1, static_cast<std::uint64_t>(i));
+    const Vec3 origin(3 * random.uniform() - 1, 3 * random.uniform() - 1, 0.5F);
+    const Vec3 direction = sample_hemisphere(Vec3(0, 0, -1), random);
+    if (direction.z() > -0.3F) continue;  // stays within the copies of the brute force
+    const Ray ray{origin, 2.5F * direction};
+    const double expected = first_hit_by_hand(e, ray, kNoFiber, 4);
+    const auto hit = scene.intersect(ray, kNoFiber);
+    ASSERT_EQ(hit.has_value(), expected >= 0) << i;
+    EXPECT_EQ(scene.occluded(ray, kNoFiber), hit.has_value());
+    if (!hit) continue;
+    ++hits;
+    EXPECT_NEAR(hit->t, expected, 2e-5) << i;
+  }
+  EXPECT_GT(hits, 300);
+}
+
+TEST(TileSceneLaw, AWholePeriodChangesNothing) {
+  const TileScene scene(synthesize(test::small_fabric("twill 2/2")));
+  const Exemplar& e = scene.exemplar();
+  int differing = 0;
+  for (int i = 0; i < 2000; ++i) {
+    RandomStream random(1, RandomStage::kTest, 2, static_cast<std::uint64_t>(i));
+    const Vec3 origin(random.uniform() * e.width_mm, random.uniform() * e.height_mm, 0.3F);
+    const Vec3 direction = sample_hemisphere(Vec3(0, 0, -1), random);
+    const auto a = scene.intersect({origin, direction}, kNoFiber);
+    const auto b = scene.intersect({origin + Vec3(-3 * e.width_mm, 2 * e.height_mm, 0), direction}, kNoFiber);
+    // Rounding of the shifted origin may move a ray that grazes a silhouette to the other side of it.
+    if (a.has_value() != b.has_value() || (a && (a->segment != b->segment || std::abs(a->t - b->t) > 1e-4F))) ++differing;
+  }
+  EXPECT_LE(differing, 4);
+}
+
+TEST(TileSceneLaw, OwnFiberIsIgnoredInEveryCopy) {
+  // One fiber, endless rows of its copies: with itself excluded, nothing is left to hit.
+  const TileScene scene(test::straight_fibers(1, 0.5F, {{0.25F, 0}}, 0.05F, 5, test::white_fiber()));
+  const Vec3 inside(0.5F, 0.25F, 0);
+  EXPECT_TRUE(scene.occluded({inside, Vec3(0, 1, 0)}, kNoFiber));
+  EXPECT_FALSE(scene.occluded({inside, Vec3(0, 1, 0)}, 0));
+  const auto neighbour = scene.intersect({inside + Vec3(0, 0.1F, 0), Vec3(0, 1, 0)}, kNoFiber);
+  ASSERT_TRUE(neighbour);
+  EXPECT_NEAR(neighbour->t, 0.35F, 1e-5F);
+}
+
+TEST(TileSceneLaw, RangeLimitsHold) {
+  const TileScene scene(test::straight_fibers(1, 1, {{0.5F, 0}}, 0.1F, 4, test::white_fiber()));
+  const Vec3 origin(0.37F, 0.5F, 1);
+  const Vec3 down(0, 0, -2);
+  const auto hit = scene.intersect({origin, down}, kNoFiber);
+  ASSERT_TRUE(hit);
+  EXPECT_NEAR(hit->t, 0.45F, 1e-6F);  // 0.9 mm at two mm per unit of t
+  EXPECT_FALSE(scene.intersect({origin, down, 0, 0.449F}, kNoFiber));
+  const auto exit = scene.intersect({origin, down, 0.46F, 1}, kNoFiber);
+  ASSERT_TRUE(exit);  // from inside, the far side
+  EXPECT_NEAR(exit->t, 0.55F, 1e-6F);
+}
+
+// A row of parallel fibers is opaque below the angle at which neighbours close the gap.
+TEST(TileSceneLaw, ARowOfFibersClosesAtTheKnownAngle) {
+  const float r = 0.1F;
+  const TileScene scene(test::straight_fibers(1, 0.5F, {{0.25F, 0}}, r, 4, test::white_fiber()));
+  // Seen from height 0 in the gap's middle, the neighbour at distance 0.25 subtends asin(r / 0.25) about the horizon.
+  const float edge = std::asin(r / 0.25F);
+  const Vec3 middle(0.31F, 0.5F, 0);
+  for (float off : {-0.01F, 0.01F}) {
+    const Vec3 direction(0.02F, std::cos(edge + off), std::sin(edge + off));
+    EXPECT_EQ(scene.occluded({middle, direction}, kNoFiber), off < 0);
+  }
+}
+
+// Sparse parallel fibers, n per area, attenuate like exp(-2 r n sin(angle to the fibers) t) within their slab.
+TEST(TileSceneStatistical, MeanFreePathOfASparseBundle) {
+  constexpr int kFibers = 600;
+  constexpr float kHalfSlab = 10;
+  std::vector<Vec2> places;
+  for (int i = 0; i < kFibers; ++i) {
+    RandomStream random(1, RandomStage::kTest, 3, static_cast<std::uint64_t>(i));
+    places.emplace_back(random.uniform(), kHalfSlab * (2 * random.uniform() - 1));
+  }
+  const float r = 0.005F;
+  const TileScene scene(test::straight_fibers(1, 1, places, r, 4, test::white_fiber()));
+  const double density = kFibers / (2.0 * kHalfSlab);
+  double distance = 0;
+  double hits = 0;
+  for (int i = 0; i < 200000; ++i) {
+    RandomStream random(1, RandomStage::kTest, 4, static_cast<std::uint64_t>(i));
+    const Vec3 d = sample_sphere(random);
+    const double z = kHalfSlab * (2 * random.uniform() - 1);
+    const double extinction = 2 * r * density * std::hypot(d.y(), d.z());
+    const double path = (d.z() > 0 ? kHalfSlab - z : kHalfSlab + z) / std::abs(d.z());
+    const double depth = extinction * path;
+    hits += 1 - std::exp(-depth);
+    distance += (1 - (1 + depth) * std::exp(-depth)) / extinction;
+  }
+  // The places are one random draw: their local density varies by about 1 / sqrt(600).
+  EXPECT_NEAR(scene.mean_free_path(1, 40000), distance / hits, 2.5 * distance / hits / std::sqrt(kFibers));
+}
+
+}  // namespace
+}  // namespace heddle
