@@ -286,7 +286,7 @@ Artifact FabricStages::ssdf() {
 Artifact FabricStages::sgs() {
   const Stage stage = fit_stage("sg", 1);
   return artifact_of(stage, [&](const fs::path& path, StageResult&) {
-    write_sg_visibility(path, fit_sg_visibility(read_visibility_maps(maps().path), document_.visibility), stage.metadata);
+    write_sg_visibility(path, fit_sgs(read_visibility_maps(maps().path), document_.visibility), stage.metadata);
   });
 }
 

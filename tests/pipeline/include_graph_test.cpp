@@ -42,7 +42,6 @@ const std::vector<std::pair<std::string, std::string>> kConfined = {
     {R"(png\.h)", R"(formats/image_file\.cpp)"},
     {R"((oneapi/)?tbb/.*)", R"(.*\.cpp)"},
     {R"(toml\+\+.*)", R"(formats/toml_table\.cpp)"},
-    {R"(tiny_obj_loader\.h)", R"(formats/obj_mesh\.cpp)"},
     {R"(xxhash\.h)", R"(formats/content_hash\.cpp)"},
     {R"(CLI/.*)", R"(pipeline/main\.cpp)"},
     {R"(nlohmann/.*)", R"((.*\.cpp|pipeline/.*\.h))"},
