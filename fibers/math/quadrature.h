@@ -9,7 +9,7 @@
 
 #include <array>
 #include <cstddef>
-#include <utility>
+#include <type_traits>
 #include <vector>
 
 namespace heddle {
@@ -45,10 +45,10 @@ struct ThreeNodeRule {
 /// Gauss rule for the weight exp(-x^2) on (-infinity, cut]: exact for polynomials of degree 5. cut >= -3.
 ThreeNodeRule cut_gauss_hermite3(double cut);
 
-/// Sum of weight * f(node).
+/// Sum of weight * f(node). f returns a number or a fixed-size Eigen array by value.
 template <typename Function>
 auto integrate(const QuadratureRule& rule, Function&& f) {
-  auto sum = decltype(f(0.0) * 1.0)(f(rule.nodes[0]) * rule.weights[0]);
+  std::decay_t<decltype(f(0.0))> sum = f(rule.nodes[0]) * rule.weights[0];
   for (std::size_t k = 1; k < rule.nodes.size(); ++k) sum += f(rule.nodes[k]) * rule.weights[k];
   return sum;
 }

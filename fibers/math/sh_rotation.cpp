@@ -43,7 +43,7 @@ struct SwapMatrix {
       for (int j = l * l; j < (l + 1) * (l + 1); ++j) {
         first[static_cast<std::size_t>(j)] = static_cast<std::int32_t>(entries.size());
         for (int k = l * l; k < (l + 1) * (l + 1); ++k) {
-          // Symmetry zeros come out below 1e-14; the smallest true entry up to order 10 is above 1e-4.
+          // Symmetry zeros come out below 1e-14; the smallest true entry up to order 10 is 1 / 512.
           if (std::abs(swap(j, k)) > 1e-9) entries.push_back({k, static_cast<T>(swap(j, k))});
         }
       }

@@ -1,0 +1,268 @@
+#include "fibers/scattering/bcsdf_table.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+
+#include "fibers/math/spherical_harmonics.h"
+#include "fibers/scattering/sg_scatter.h"
+#include "tests/fibers/scattering/fibers_for_tests.h"
+#include "tests/support/statistics.h"
+
+namespace heddle {
+namespace {
+
+const double kViewsDeg[] = {0.0, -30.0, 60.0, 85.0, -89.5};
+
+Vec3 view(double theta_deg, double phi = 0.4) {
+  return vector_from({radians(theta_deg), phi}).cast<float>();
+}
+
+double narrowest(const FiberScattering& fiber) {
+  return fiber.isotropic_white ? 1.0 : std::min(fiber.beta_r, fiber.beta_tt);
+}
+
+TEST(BcsdfTableAgreement, ValueAgainstTheDefinition) {
+  RandomStream random(1, RandomStage::kTest, 0, 0);
+  double worst = 0.0;
+  for (const NamedFiber& named : fibers_for_tests()) {
+    const BcsdfTable table(named.scattering);
+    // Float angles are good to 2e-7, which at four deviations changes a Gaussian by 4 / beta * 2e-7
+    // relatively; values far below the peak are compared with 1 % of it.
+    const double tolerance = 2e-5 + 1e-6 / std::min(narrowest(named.scattering), named.scattering.gamma_tt);
+    for (int k = 0; k < 2000; ++k) {
+      const Vec3 wo = sample_sphere(random);
+      const Vec3 wi = k % 2 == 0 ? sample_sphere(random) : table.sample(wo, random).wi;
+      const Vec3d wo_exact = wo.cast<double>().normalized();
+      const FiberDirection out = fiber_direction(wo_exact);
+      const Rgbd exact = evaluate_bcsdf(named.scattering, wi.cast<double>().normalized(), wo_exact);
+      const Rgbd value = table.evaluate(wi, wo).cast<double>();
+      const double peak =
+          evaluate_bcsdf(named.scattering, vector_from({-out.theta, out.phi + kPi}), wo_exact).maxCoeff();
+      const double error = ((value - exact).abs() / (exact + 0.01 * peak + 1e-30)).maxCoeff();
+      EXPECT_LT(error, tolerance) << named.name;
+      worst = std::max(worst, error / tolerance);
+    }
+  }
+  std::printf("  worst error: %.2f of the tolerance\n", worst);
+}
+
+TEST(BcsdfTableStatistical, SamplesFollowTheDensity) {
+  struct Case {
+    const char* name;
+    FiberScattering fiber;
+    double zoom_deg;  // half height of the window about the specular cone; 0: everything
+  };
+  const Rgbd color_r(.3, .2, .1);
+  const Rgbd color_tt(.9, .5, .1);
+  const Case cases[] = {
+      {"beta .1 / .1, gamma 20", fiber_in_degrees(color_r, color_tt, .1, .1, 20), .5},
+      {"silk", fibers_for_tests()[2].scattering, 5.0},
+      {"cotton", fibers_for_tests()[3].scattering, 5.0},
+      {"beta 10 / 10, gamma 10", fiber_in_degrees(color_r, color_tt, 10, 10, 10), 0.0},
+      {"beta 27 / 27, gamma 38", fiber_in_degrees(color_r, color_tt, 27, 27, 38), 0.0},
+      {"beta 60 / 60, gamma 60", fiber_in_degrees(color_r, color_tt, 60, 60, 60), 0.0},
+      {"white", white_isotropic_fiber(), 0.0},
+  };
+  constexpr int kTests = static_cast<int>(std::size(cases) * std::size(kViewsDeg));
+  RandomStream random(2, RandomStage::kTest, 0, 0);
+  for (const Case& c : cases) {
+    const BcsdfTable table(c.fiber);
+    for (const double theta_deg : kViewsDeg) {
+      const Vec3 wo = view(theta_deg);
+      AngleWindow window;
+      if (c.zoom_deg > 0.0) {
+        window.theta_min = radians(std::max(-90.0, -theta_deg - c.zoom_deg));
+        window.theta_max = radians(std::min(90.0, -theta_deg + c.zoom_deg));
+      }
+      char name[64];
+      std::snprintf(name, sizeof name, "%s, theta_o %g", c.name, theta_deg);
+      EXPECT_TRUE(chi_square_accepts(
+          name, [&] { return Vec3d(table.sample(wo, random).wi.cast<double>()); },
+          [&](const Vec3d& wi) { return static_cast<double>(table.pdf(wi.cast<float>(), wo)); }, 100000,
+          kTests, window));
+    }
+  }
+}
+
+TEST(BcsdfTableStatistical, ADensityWrongByTwoPercentIsRejected) {
+  const BcsdfTable table(fiber_in_degrees({.3, .2, .1}, {.9, .5, .1}, 10, 10, 10));
+  RandomStream random(3, RandomStage::kTest, 0, 0);
+  const Vec3 wo = view(60.0, 0.0);
+  const auto sample = [&] { return Vec3d(table.sample(wo, random).wi.cast<double>()); };
+  EXPECT_FALSE(chi_square_accepts(
+      "2 % off by halves", sample,
+      [&](const Vec3d& wi) {
+        return (wi.z() > 0.0 ? 0.98 : 1.02) * static_cast<double>(table.pdf(wi.cast<float>(), wo));
+      },
+      1000000, 10));
+}
+
+TEST(BcsdfTableLaw, DensityIntegratesToOne) {
+  for (const NamedFiber& named : fibers_for_tests()) {
+    const BcsdfTable table(named.scattering);
+    for (const double theta_deg : kViewsDeg) {
+      const Vec3 wo = view(theta_deg, 0.0);
+      std::vector<double> theta_breaks;
+      std::vector<double> phi_breaks;
+      for (const double beta : {named.scattering.beta_r, named.scattering.beta_tt}) {
+        append_geometric_breaks(-radians(theta_deg), beta, kPi, theta_breaks);
+      }
+      append_geometric_breaks(0.0, std::min(1.0, named.scattering.gamma_tt), kPi, phi_breaks);
+      const QuadratureRule phi_rule = gauss_legendre_panels(12, -kPi, kPi, phi_breaks);
+      const QuadratureRule theta_rule = gauss_legendre_panels(12, -0.5 * kPi, 0.5 * kPi, theta_breaks);
+      const double total = integrate(theta_rule, [&](double theta) {
+        return std::cos(theta) * integrate(phi_rule, [&](double from_peak) {
+                 return static_cast<double>(
+                     table.pdf(vector_from({theta, kPi + from_peak}).cast<float>(), wo));
+               });
+      });
+      // At 0.1 degrees float angles (2e-7) shift theta by 1e-4 of the deviation.
+      EXPECT_NEAR(total, 1.0, 3e-4) << named.name << " at " << theta_deg;
+    }
+  }
+}
+
+TEST(BcsdfTableStatistical, MeanWeightIsTheAdjointAlbedoAndTheWorstIsSmall) {
+  constexpr int kSamples = 100000;
+  const std::vector<NamedFiber> fibers = fibers_for_tests();
+  const int tests = static_cast<int>(fibers.size() * std::size(kViewsDeg));
+  RandomStream random(4, RandomStage::kTest, 0, 0);
+  float worst = 0.0F;
+  for (const NamedFiber& named : fibers) {
+    const BcsdfTable table(named.scattering);
+    for (const double theta_deg : kViewsDeg) {
+      RunningMean mean;
+      float worst_here = 0.0F;
+      for (int k = 0; k < kSamples; ++k) {
+        const BcsdfTable::Sample sample = table.sample(view(theta_deg), random);
+        ASSERT_TRUE(sample.weight.allFinite() && sample.weight.minCoeff() >= 0.0F && sample.pdf > 0.0F)
+            << named.name;
+        mean.add(static_cast<double>(sample.weight[1]));
+        worst_here = std::max(worst_here, sample.weight.maxCoeff());
+      }
+      const double albedo = bcsdf_sh(named.scattering, radians(theta_deg), 0)[0][1] * std::sqrt(4.0 * kPi);
+      char name[64];
+      std::snprintf(name, sizeof name, "%s, theta_o %g", named.name.c_str(), theta_deg);
+      // The tables and float angles are good to 1e-4.
+      EXPECT_TRUE(means_agree(name, mean.mean(), mean.standard_error(), albedo, 1e-4 * albedo + 1e-9, tests));
+      std::printf("    worst weight %.3f\n", static_cast<double>(worst_here));
+      worst = std::max(worst, worst_here);
+    }
+  }
+  std::printf("  worst weight of all: %.3f\n", static_cast<double>(worst));
+  EXPECT_LT(worst, 4.0F);
+}
+
+TEST(BcsdfTable, WhiteIsotropicFiberIsSampledWithWeightOne) {
+  const BcsdfTable table(white_isotropic_fiber());
+  RandomStream random(5, RandomStage::kTest, 0, 0);
+  for (int k = 0; k < 1000; ++k) {
+    const Vec3 wo = sample_sphere(random);
+    const BcsdfTable::Sample sample = table.sample(wo, random);
+    EXPECT_EQ(sample.weight.minCoeff(), 1.0F);
+    EXPECT_EQ(sample.weight.maxCoeff(), 1.0F);
+    const float cosine = std::hypot(sample.wi.y(), sample.wi.z());
+    EXPECT_NEAR(table.evaluate(sample.wi, wo)[0] * cosine / table.pdf(sample.wi, wo), 1.0F, 1e-5F);
+  }
+}
+
+TEST(BcsdfTableAgreement, SampleReportsItsOwnDensityAndWeight) {
+  RandomStream random(6, RandomStage::kTest, 0, 0);
+  for (const NamedFiber& named : fibers_for_tests()) {
+    const BcsdfTable table(named.scattering);
+    const auto tolerance =
+        static_cast<float>(1e-4 + 3e-6 / std::min(narrowest(named.scattering), named.scattering.gamma_tt));
+    for (int k = 0; k < 1000; ++k) {
+      const Vec3 wo = sample_sphere(random);
+      const BcsdfTable::Sample sample = table.sample(wo, random);
+      EXPECT_NEAR(sample.wi.norm(), 1.0F, 1e-6F);
+      const float cosine = std::hypot(sample.wi.y(), sample.wi.z());
+      if (cosine < 1e-3F) continue;  // the density's 1 / cosine is then good to 1e-4 or less
+      EXPECT_NEAR(table.pdf(sample.wi, wo) / sample.pdf, 1.0F, tolerance) << named.name;
+      const Rgb weight = table.evaluate(sample.wi, wo) * (cosine / table.pdf(sample.wi, wo));
+      EXPECT_LT((weight - sample.weight).abs().maxCoeff(), tolerance) << named.name;
+    }
+  }
+}
+
+TEST(BcsdfTableAgreement, HarmonicsAgainstTheDefinition) {
+  for (const NamedFiber& named : fibers_for_tests()) {
+    const BcsdfTable table(named.scattering);
+    for (int k = 0; k <= 60; ++k) {
+      const double theta_o = kPi * (k / 60.0 - 0.5);
+      std::vector<float> row(3 * sh_count(5));
+      table.sh_coefficients(static_cast<float>(theta_o), 5, row.data());
+      const std::vector<Rgbd> exact = bcsdf_sh(named.scattering, theta_o, 5);
+      // Rows are h = 6.1e-3 rad apart. Harmonics up to band 5 are at most sqrt(11 / 4 pi) = .94 with second
+      // derivatives up to 30 times that: 28 h^2 / 8 = 1.3e-4. Where an end cuts the lobe, values change on
+      // its own scale: (h / beta)^2 / 8 of the changing part, which is at most a tenth.
+      const double beta = narrowest(named.scattering);
+      const double spacing = kPi / (BcsdfTable::kRows - 1);
+      const bool is_cut = 0.5 * kPi - std::abs(theta_o) < 7.0 * beta + spacing;
+      const double tolerance =
+          1.3e-4 + (is_cut ? std::min(0.1, 0.1 / 8.0 * spacing * spacing / (beta * beta)) : 0.0);
+      for (std::size_t j = 0; j < exact.size(); ++j) {
+        for (std::size_t c = 0; c < 3; ++c) {
+          EXPECT_NEAR(row[3 * j + c], exact[j][static_cast<Eigen::Index>(c)], tolerance)
+              << named.name << " " << theta_o << " " << j;
+        }
+      }
+    }
+  }
+}
+
+TEST(BcsdfTableAgreement, LightFromSphericalGaussiansAgainstDouble) {
+  RandomStream random(7, RandomStage::kTest, 0, 0);
+  std::vector<NamedFiber> fibers = fibers_for_tests();
+  fibers.push_back({"white", white_isotropic_fiber()});
+  double worst = 0.0;
+  for (const NamedFiber& named : fibers) {
+    const BcsdfTable table(named.scattering);
+    // The float angle between light and cone is good to 2e-7, against beta about 10 / beta of it in the
+    // exponent.
+    const double tolerance = 3e-5 + 3e-6 / narrowest(named.scattering);
+    for (const float sharpness : {0.0F, 1e-3F, 1.0F, 7.0F, 8.5F, 48.0F, 150.0F, 1e3F, 1e5F, 1e8F}) {
+      for (int k = 0; k < 100; ++k) {
+        const Vec3 wo = k == 0 ? Vec3(Vec3::UnitX()) : sample_sphere(random);
+        const Vec3 axis = k % 2 == 0 ? sample_sphere(random) : table.sample(wo, random).wi;
+        const Rgbd value = table.sg_scatter(axis, sharpness, wo).cast<double>();
+        const SphericalGaussian light{axis.cast<double>().normalized(), static_cast<double>(sharpness)};
+        const Rgbd exact =
+            sg_scatter(named.scattering, light, wo.cast<double>().normalized(), SgMethod::kDefault);
+        ASSERT_TRUE(value.allFinite() && value.minCoeff() >= 0.0) << named.name << " " << sharpness;
+        const double scale = std::max(exact.maxCoeff(), 1e-9 * sg_mass(light.sharpness));
+        const double error = (value - exact).abs().maxCoeff() / scale;
+        EXPECT_LT(error, tolerance) << named.name << ", sharpness " << sharpness;
+        worst = std::max(worst, error / tolerance);
+      }
+    }
+  }
+  std::printf("  worst error: %.2f of the tolerance\n", worst);
+}
+
+TEST(BcsdfTableStability, FiniteAtTheEndsOfTheSphere) {
+  const Vec3 ends[] = {Vec3(1.0F, 0.0F, 0.0F), Vec3(-1.0F, 0.0F, 0.0F), Vec3(1.0F, 1e-20F, 0.0F),
+                       Vec3(-1.0F, 0.0F, 1e-7F), Vec3(0.0F, 0.0F, 1.0F)};
+  for (const NamedFiber& named : fibers_for_tests()) {
+    const BcsdfTable table(named.scattering);
+    RandomStream random(8, RandomStage::kTest, 0, 0);
+    for (const Vec3& wo : ends) {
+      for (const Vec3& wi : ends) {
+        const Rgb value = table.evaluate(wi, wo);
+        ASSERT_TRUE(value.allFinite() && value.minCoeff() >= 0.0F) << named.name;
+        ASSERT_TRUE(std::isfinite(table.pdf(wi, wo)) && table.pdf(wi, wo) >= 0.0F) << named.name;
+        ASSERT_TRUE(table.sg_scatter(wi, 100.0F, wo).allFinite()) << named.name;
+      }
+      for (int k = 0; k < 1000; ++k) {
+        const BcsdfTable::Sample sample = table.sample(wo, random);
+        ASSERT_TRUE(sample.weight.allFinite() && std::isfinite(sample.pdf) && sample.pdf > 0.0F)
+            << named.name;
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace heddle
