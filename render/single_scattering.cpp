@@ -13,8 +13,8 @@ namespace {
 
 constexpr int kMaxLobes = 128;
 
-/// Lobes that carry less than this share of the strongest lobe's light are left out. With 48 lobes, all of them together carry
-/// less than 48e-5 of it.
+/// Lobes that carry less than this share of the strongest lobe's light are left out. With 48 lobes, all of
+/// them together carry less than 48e-5 of it.
 constexpr float kNegligible = 1e-5F;
 
 }  // namespace

@@ -1,0 +1,130 @@
+#include "render/cloth_scene.h"
+
+#include <cmath>
+#include <map>
+#include <utility>
+
+namespace heddle {
+
+namespace {
+
+// Room above the highest and below the lowest fiber, in thicknesses: no fiber touches the shell's faces.
+constexpr double kShellMargin = 1e-3;
+// Distance of an underlay from the shell, in thicknesses.
+constexpr double kUnderlayGap = 1e-2;
+// Start of global shadow rays above the shell: some 30 times the rounding of a float at 300 mm.
+constexpr double kLiftMm = 1e-3;
+
+double thickness(const Exemplar& exemplar) {
+  return static_cast<double>(exemplar.z_max) - static_cast<double>(exemplar.z_min);
+}
+
+Shell make_shell(const ClothMesh& mesh, const Exemplar& exemplar) {
+  const double margin = kShellMargin * thickness(exemplar);
+  return Shell(mesh, static_cast<double>(exemplar.z_min) - margin,
+               static_cast<double>(exemplar.z_max) + margin);
+}
+
+TriangleMesh scaled_mesh(const ObjMesh& obj, double mm_per_unit) {
+  TriangleMesh mesh;
+  for (const std::array<float, 3>& p : obj.positions) {
+    mesh.positions.push_back((mm_per_unit * Vec3d(p[0], p[1], p[2])).cast<float>());
+  }
+  mesh.triangles = obj.triangles;
+  return mesh;
+}
+
+}  // namespace
+
+std::vector<TriangleMesh> ClothScene::boundaries(const std::vector<Cloth>& cloths) {
+  std::vector<TriangleMesh> meshes;
+  for (const Cloth& cloth : cloths) meshes.push_back(cloth.shell.boundary_mesh());
+  return meshes;
+}
+
+ClothScene::ClothScene(std::vector<ClothPiece> pieces, std::vector<TriangleMesh> black_meshes)
+    : cloths_([&] {
+        std::vector<Cloth> cloths;
+        std::map<const TileScene*, std::uint16_t> offsets;
+        for (ClothPiece& piece : pieces) {
+          const Exemplar& exemplar = piece.tile->exemplar();
+          const auto [place, is_new] =
+              offsets.try_emplace(piece.tile.get(), static_cast<std::uint16_t>(materials_.size()));
+          if (is_new) {
+            materials_.insert(materials_.end(), exemplar.scattering.begin(), exemplar.scattering.end());
+          }
+          Shell shell = make_shell(piece.mesh, exemplar);
+          if (piece.underlay)
+            black_meshes.push_back(shell.underside_mesh(kUnderlayGap * thickness(exemplar)));
+          cloths.push_back({std::move(piece.tile), std::move(shell), place->second});
+        }
+        return cloths;
+      }()),
+      boundary_(boundaries(cloths_)),
+      black_(black_meshes) {}
+
+bool ClothScene::occluded(const SceneRay& ray) const {
+  if (black_.occluded(ray.origin.cast<float>(), ray.direction, static_cast<float>(ray.t_max))) return true;
+  bool is_blocked = false;
+  double limit = ray.t_max;
+  walk(ray, RayReach::kEverything, limit,
+       [&](std::uint32_t cloth, const ShellInterval& interval, std::uint32_t own_fiber) {
+         const LocalRay local =
+             local_ray(interval, exemplar(cloth), ray.from != nullptr && interval.t0 == 0.0);
+         if (!cloths_[cloth].tile->occluded(local.ray, own_fiber)) return false;
+         is_blocked = true;
+         limit = -1;
+         return true;
+       });
+  return is_blocked;
+}
+
+bool ClothScene::globally_visible(const Shell::SurfacePoint& point, const Vec3& direction) const {
+  const Vec3 origin = (point.position + kLiftMm * point.normal).cast<float>();
+  return !boundary_.occluded(origin, direction) && !black_.occluded(origin, direction);
+}
+
+ClothScene::LocalRay ClothScene::local_ray(const ShellInterval& interval, const Exemplar& exemplar,
+                                           bool at_start) {
+  const double margin = std::min(1.0, kMarginMm / (interval.t1 - interval.t0));
+  const double before = at_start ? 0.0 : margin;
+  const Vec3d direction = interval.fabric1 - interval.fabric0;
+  Vec3d origin = interval.fabric0 - before * direction;
+  const double width = exemplar.width_mm;
+  const double height = exemplar.height_mm;
+  origin.x() -= width * std::floor(origin.x() / width);
+  origin.y() -= height * std::floor(origin.y() / height);
+  return {{origin.cast<float>(), direction.cast<float>(), 0.0F, static_cast<float>(1.0 + before + margin)},
+          before};
+}
+
+std::uint32_t ClothScene::flipped_tets() const {
+  std::uint32_t count = 0;
+  for (const Cloth& cloth : cloths_) count += cloth.shell.flipped_count();
+  return count;
+}
+
+std::uint32_t ClothScene::degenerate_tets() const {
+  std::uint32_t count = 0;
+  for (const Cloth& cloth : cloths_) count += cloth.shell.degenerate_count();
+  return count;
+}
+
+ClothScene make_cloth_scene(const SceneConfig& config,
+                            std::span<const std::shared_ptr<const TileScene>> tiles) {
+  std::vector<ClothPiece> pieces;
+  for (std::size_t k = 0; k < config.cloths.size(); ++k) {
+    const ClothConfig& cloth = config.cloths[k];
+    pieces.push_back({tiles[k],
+                      cloth.mesh ? cloth_mesh_of(read_obj(cloth.mesh->path), cloth.mesh->path.string(),
+                                                 cloth.mesh->mm_per_unit, cloth.uv_size_mm)
+                                 : flat_cloth(cloth.flat_width_mm, cloth.flat_height_mm),
+                      cloth.underlay});
+  }
+  std::vector<TriangleMesh> black;
+  for (const MeshFile& mesh : config.meshes)
+    black.push_back(scaled_mesh(read_obj(mesh.path), mesh.mm_per_unit));
+  return {std::move(pieces), std::move(black)};
+}
+
+}  // namespace heddle

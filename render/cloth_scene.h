@@ -1,0 +1,213 @@
+#ifndef HEDDLE_RENDER_CLOTH_SCENE_H_
+#define HEDDLE_RENDER_CLOTH_SCENE_H_
+// All cloth and all black meshes of a scene in world space (millimetres): rays through the shell maps against
+// the explicit fibers (or whatever a query finds in fabric space), and macroscopic visibility against shells
+// and meshes.
+//
+// Shells may overlap in space; a ray visits all of them. Only a ray that starts inside one shell does not see
+// what another shell holds around its very origin. Fabric coordinates are folded into the base tile in double
+// before they become floats. Tested in tests/render/cloth_scene_test.cpp.
+
+#include <algorithm>
+#include <atomic>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "fibers/math/vector.h"
+#include "fibers/tracing/tile_scene.h"
+#include "render/scene_config.h"
+#include "render/shell.h"
+#include "render/triangle_scene.h"
+
+namespace heddle {
+
+/// One piece of cloth. Pieces of the same fabric share their tile.
+struct ClothPiece {
+  std::shared_ptr<const TileScene> tile;
+  ClothMesh mesh;
+  bool underlay = false;  // a black copy of the underside lies below
+};
+
+/// A point on a fiber, seen through a shell.
+struct ShellHit {
+  std::uint32_t cloth = 0;
+  std::uint32_t tet = 0;
+  std::uint32_t segment = 0;
+  double t = 0;    // mm along the ray
+  Vec3d position;  // world
+  Vec3d fabric;    // fabric space, not folded into the tile
+};
+
+/// A ray through the scene; direction of unit length. It may start at a hit, whose fiber it then ignores
+/// until it has left that shell.
+struct SceneRay {
+  Vec3d origin;
+  Vec3 direction;
+  const ShellHit* from = nullptr;
+  double t_max = std::numeric_limits<double>::infinity();
+};
+
+/// How far a ray is followed.
+enum class RayReach : std::uint8_t {
+  kEverything,  // through every shell that it meets
+  kOwnShell,    // until it leaves the shell that it starts in
+};
+
+class ClothScene {
+ public:
+  ClothScene(std::vector<ClothPiece> pieces, std::vector<TriangleMesh> black_meshes);
+
+  std::size_t cloth_count() const { return cloths_.size(); }
+  const Shell& shell(std::uint32_t cloth) const { return cloths_[cloth].shell; }
+  const TileScene& tile(std::uint32_t cloth) const { return *cloths_[cloth].tile; }
+  const Exemplar& exemplar(std::uint32_t cloth) const { return cloths_[cloth].tile->exemplar(); }
+  /// Materials of all fabrics in one list, each fabric once: a fiber's index is material_offset(cloth) + its
+  /// own.
+  std::uint16_t material_offset(std::uint32_t cloth) const { return cloths_[cloth].material_offset; }
+  std::vector<FiberScattering> materials() const { return materials_; }
+
+  /// First thing that `query` finds along the ray. query(cloth, ray, own_fiber) -> std::optional<FiberHit>
+  /// looks along a fabric-space ray from its origin to t_max (own_fiber is kNoFiber or the fiber to ignore).
+  template <class Query>
+  std::optional<ShellHit> first_hit(const SceneRay& ray, RayReach reach, Query&& query) const;
+
+  /// First fiber along the ray.
+  std::optional<ShellHit> first_fiber(const SceneRay& ray, RayReach reach = RayReach::kEverything) const {
+    return first_hit(ray, reach, [this](std::uint32_t cloth, const Ray& local, std::uint32_t own_fiber) {
+      return cloths_[cloth].tile->intersect(local, own_fiber);
+    });
+  }
+  /// Does the ray meet a fiber or a black mesh?
+  bool occluded(const SceneRay& ray) const;
+
+  /// Distance to the first black mesh.
+  std::optional<float> first_black(const Vec3d& origin, const Vec3& direction) const {
+    return black_.intersect(origin.cast<float>(), direction);
+  }
+
+  /// Is a point of a shell's surface open towards `direction`, past all shells (as solids) and black meshes?
+  bool globally_visible(const Shell::SurfacePoint& point, const Vec3& direction) const;
+
+  /// Surface point of the shell straight over (kFace) or under (kBack) a hit.
+  Shell::SurfacePoint surface_point(const ShellHit& hit, ClothSide side) const {
+    return shell(hit.cloth).surface_point(hit.tet / 3, hit.fabric.head<2>(), side);
+  }
+  /// The same over another fabric position near the hit; nothing beyond a rim.
+  std::optional<Shell::SurfacePoint> surface_point(const ShellHit& hit, const Eigen::Vector2d& fabric_xy,
+                                                   ClothSide side) const {
+    const std::optional<std::uint32_t> triangle = shell(hit.cloth).find_triangle(hit.tet / 3, fabric_xy);
+    if (!triangle) return {};
+    return shell(hit.cloth).surface_point(*triangle, fabric_xy, side);
+  }
+
+  /// A world direction in the fabric space of the hit, unit length.
+  Vec3 fabric_direction(const ShellHit& hit, const Vec3& direction) const {
+    return (shell(hit.cloth).fabric_from_world(hit.tet) * direction).normalized();
+  }
+  /// Unit tangent of the hit fiber in world space.
+  Vec3 world_tangent(const ShellHit& hit) const {
+    return (shell(hit.cloth).world_from_fabric(hit.tet) * exemplar(hit.cloth).segment_tangent(hit.segment))
+        .normalized();
+  }
+
+  /// Walks through a shell that rounding brought to an end early; what lay beyond was not seen.
+  std::uint64_t failed_walks() const { return failed_walks_.load(std::memory_order_relaxed); }
+  std::uint32_t flipped_tets() const;
+  std::uint32_t degenerate_tets() const;
+
+ private:
+  struct Cloth {
+    std::shared_ptr<const TileScene> tile;
+    Shell shell;
+    std::uint16_t material_offset;
+  };
+
+  // The ray in fabric space over one interval: s = t - margin runs from 0 (t0) to 1 (t1). It is a little
+  // longer at the ends that are not the start of the ray, so that nothing falls between two tetrahedra.
+  struct LocalRay {
+    Ray ray;
+    double margin;
+  };
+  static LocalRay local_ray(const ShellInterval& interval, const Exemplar& exemplar, bool at_start);
+
+  // Shorter intervals are left to the margins of their neighbours.
+  static constexpr double kShortestMm = 1e-7;
+  static constexpr double kMarginMm = 1e-6;
+
+  // Calls visit(cloth, interval, own_fiber) -> bool (true stops the walk through this shell) for the shells
+  // in order of where the ray enters them; `limit` may shrink meanwhile, and nothing that starts beyond it is
+  // visited.
+  template <class Visit>
+  void walk(const SceneRay& ray, RayReach reach, const double& limit, Visit&& visit) const;
+
+  static std::vector<TriangleMesh> boundaries(const std::vector<Cloth>& cloths);
+
+  std::vector<FiberScattering> materials_;
+  std::vector<Cloth> cloths_;
+  TriangleScene boundary_;  // mesh index = cloth
+  TriangleScene black_;
+  mutable std::atomic<std::uint64_t> failed_walks_ = 0;
+};
+
+/// The scene of a config. tiles: [cloth].
+ClothScene make_cloth_scene(const SceneConfig& config,
+                            std::span<const std::shared_ptr<const TileScene>> tiles);
+
+template <class Visit>
+void ClothScene::walk(const SceneRay& ray, RayReach reach, const double& limit, Visit&& visit) const {
+  const Vec3d direction = ray.direction.cast<double>().normalized();
+  const auto note = [this](Shell::WalkEnd end) {
+    if (end == Shell::WalkEnd::kFailed) failed_walks_.fetch_add(1, std::memory_order_relaxed);
+  };
+  if (ray.from != nullptr) {
+    const std::uint32_t cloth = ray.from->cloth;
+    const std::uint32_t own_fiber = exemplar(cloth).segment_fiber[ray.from->segment];
+    note(shell(cloth).walk_from_inside(
+        ray.origin, direction, ray.from->tet, ray.from->fabric, [&](const ShellInterval& interval) {
+          return interval.t0 > limit ||
+                 (interval.t1 - interval.t0 > kShortestMm && visit(cloth, interval, own_fiber));
+        }));
+    if (reach == RayReach::kOwnShell) return;
+  }
+  static thread_local std::vector<TriangleScene::Crossing> crossings;
+  boundary_.crossings(ray.origin.cast<float>(), ray.direction, static_cast<float>(limit), crossings);
+  for (const TriangleScene::Crossing& crossing : crossings) {
+    if (static_cast<double>(crossing.t) > limit) break;
+    note(shell(crossing.mesh)
+             .walk_from_face(ray.origin, direction, crossing.triangle, [&](const ShellInterval& interval) {
+               return interval.t0 > limit ||
+                      (interval.t1 - interval.t0 > kShortestMm && visit(crossing.mesh, interval, kNoFiber));
+             }));
+  }
+}
+
+template <class Query>
+std::optional<ShellHit> ClothScene::first_hit(const SceneRay& ray, RayReach reach, Query&& query) const {
+  std::optional<ShellHit> best;
+  double limit = ray.t_max;
+  walk(ray, reach, limit, [&](std::uint32_t cloth, const ShellInterval& interval, std::uint32_t own_fiber) {
+    const LocalRay local = local_ray(interval, exemplar(cloth), ray.from != nullptr && interval.t0 == 0.0);
+    const std::optional<FiberHit> hit = query(cloth, local.ray, own_fiber);
+    if (!hit) return false;
+    const double s = std::clamp(static_cast<double>(hit->t) - local.margin, 0.0, 1.0);
+    const double t = interval.t0 + s * (interval.t1 - interval.t0);
+    if (t > limit || t < 0) return false;
+    limit = t;
+    best = ShellHit{cloth,
+                    interval.tet,
+                    hit->segment,
+                    t,
+                    ray.origin + t * ray.direction.cast<double>().normalized(),
+                    interval.fabric0 + s * (interval.fabric1 - interval.fabric0)};
+    return true;
+  });
+  return best;
+}
+
+}  // namespace heddle
+
+#endif  // HEDDLE_RENDER_CLOTH_SCENE_H_

@@ -1,0 +1,61 @@
+#ifndef HEDDLE_RENDER_CLOTH_TRACE_H_
+#define HEDDLE_RENDER_CLOTH_TRACE_H_
+// Shell-mapped cloth as a Trace for walk_path; directions and tangents are world space.
+//
+// A scattered ray ignores its own fiber until it has left the shell it starts in; then it may enter this
+// shell again or another. A path that may not go on ends at a vertex with `is_end` set: on a black mesh, or
+// (local) where it would meet cloth again after leaving its shell. So a path escapes where, and only where,
+// its last ray is not occluded: light found by escaping and light found by shadow rays are the same integral.
+// Tested in tests/render/cloth_trace_test.cpp.
+
+#include <cstdint>
+#include <optional>
+
+#include "render/cloth_scene.h"
+
+namespace heddle {
+
+class ClothTrace {
+ public:
+  struct Vertex {
+    ShellHit hit;
+    Vec3 tangent;            // unit, world
+    std::uint16_t material;  // index into ClothScene::materials()
+    bool is_end = false;
+  };
+
+  /// With `local`, paths end where they leave the shell that they are in.
+  ClothTrace(const ClothScene& scene, bool local) : scene_(&scene), local_(local) {}
+
+  Vertex vertex(const ShellHit& hit) const {
+    const Exemplar& exemplar = scene_->exemplar(hit.cloth);
+    return {hit, scene_->world_tangent(hit),
+            static_cast<std::uint16_t>(scene_->material_offset(hit.cloth) +
+                                       exemplar.segment_material(hit.segment))};
+  }
+
+  std::optional<Vertex> next(const Vertex& from, const Vec3& direction) const {
+    SceneRay ray{from.hit.position, direction, &from.hit};
+    const std::optional<float> black = scene_->first_black(ray.origin, direction);
+    if (black) ray.t_max = static_cast<double>(*black);
+    const std::optional<ShellHit> hit =
+        scene_->first_fiber(ray, local_ ? RayReach::kOwnShell : RayReach::kEverything);
+    if (hit) return vertex(*hit);
+    if (!black && !(local_ && scene_->occluded(ray))) return {};
+    Vertex end = from;
+    end.is_end = true;
+    return end;
+  }
+
+  bool escapes(const Vertex& from, const Vec3& direction) const {
+    return !scene_->occluded({from.hit.position, direction, &from.hit});
+  }
+
+ private:
+  const ClothScene* scene_;
+  bool local_;
+};
+
+}  // namespace heddle
+
+#endif  // HEDDLE_RENDER_CLOTH_TRACE_H_

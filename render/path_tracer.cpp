@@ -1,0 +1,165 @@
+#include "render/path_tracer.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cassert>
+#include <chrono>
+#include <cmath>
+
+namespace heddle {
+
+namespace {
+
+// Power heuristic with exponent 2, written so that neither square can overflow.
+float power_heuristic(float chosen, float other) {
+  const float ratio = other / chosen;
+  return 1.0F / (1.0F + ratio * ratio);
+}
+
+}  // namespace
+
+PathTracer::PathTracer(const ClothScene& scene, std::span<const BcsdfTable> materials,
+                       std::span<const Light> lights, const Rgb& background,
+                       const PathTracerSettings& settings)
+    : scene_(&scene),
+      materials_(materials),
+      lights_(lights),
+      background_(background),
+      settings_(settings),
+      trace_(scene, settings.local) {}
+
+PathTracer::Sample PathTracer::radiance(const ClothTrace::Vertex& vertex, const Vec3& wo,
+                                        RandomStream& random) const {
+  Sample sample;
+  const auto by_shadow_rays = [&](const ClothTrace::Vertex& at, const Mat3& frame, const Vec3& out,
+                                  const Rgb& throughput, int scattering) {
+    if (at.is_end) return false;
+    if (settings_.estimator == LightEstimator::kEscapes) return true;
+    const BcsdfTable& bcsdf = materials_[at.material];
+    const Vec3 local_out = frame.transpose() * out;
+    for (const Light& light : lights_) {
+      const LightSample incoming = sample_light(light, random);
+      const Vec3 local_in = frame.transpose() * incoming.direction;
+      const float cosine = std::sqrt(std::max(0.0F, 1.0F - local_in.x() * local_in.x()));
+      Rgb value = throughput * incoming.weight * bcsdf.evaluate(local_in, local_out) * cosine;
+      if (!(value.maxCoeff() > 0)) continue;
+      if (settings_.estimator == LightEstimator::kCombined && !light.is_directional()) {
+        value *= power_heuristic(incoming.pdf, bcsdf.pdf(local_in, local_out));
+      }
+      if (!trace_.escapes(at, incoming.direction)) continue;
+      (scattering == 1 ? sample.single : sample.multiple) += value;
+    }
+    return true;
+  };
+  const std::optional<PathEscape> escape =
+      walk_path(trace_, materials_, vertex, wo, Rgb(1, 1, 1), random, settings_.limits, by_shadow_rays);
+  if (escape && settings_.estimator != LightEstimator::kShadowRays) {
+    Rgb light_sum = Rgb::Zero();
+    for (const Light& light : lights_) {
+      Rgb incoming = light_radiance(light, escape->direction);
+      if (settings_.estimator == LightEstimator::kCombined) {
+        incoming *= power_heuristic(escape->pdf, light_pdf(light, escape->direction));
+      }
+      light_sum += incoming;
+    }
+    (escape->scatterings == 1 ? sample.single : sample.multiple) += escape->throughput * light_sum;
+  }
+  return sample;
+}
+
+PathTracer::Sample PathTracer::trace(const EyeRay& ray, RandomStream& random) const {
+  SceneRay scene_ray{ray.origin, ray.direction};
+  const std::optional<float> black = scene_->first_black(ray.origin, ray.direction);
+  if (black) scene_ray.t_max = static_cast<double>(*black);
+  Sample sample;
+  if (const std::optional<ShellHit> hit = scene_->first_fiber(scene_ray)) {
+    sample = radiance(trace_.vertex(*hit), -ray.direction, random);
+    sample.alpha = 1;
+  } else if (black) {
+    sample.alpha = 1;
+  } else {
+    sample.background = background_;
+  }
+  return sample;
+}
+
+std::vector<BcsdfTable> scene_materials(const ClothScene& scene) {
+  std::vector<BcsdfTable> tables;
+  for (const FiberScattering& fiber : scene.materials()) tables.emplace_back(fiber);
+  return tables;
+}
+
+FrameBuffers trace_picture(const PathTracer& tracer, const Camera& camera, const PixelRect& crop,
+                           std::uint64_t seed, const SampleBudget& budget, const RenderProgress& progress) {
+  assert(budget.seconds || (budget.spp >= 2 && budget.spp % 2 == 0));
+  struct Sums {
+    Rgbd single = Rgbd::Zero();
+    Rgbd multiple = Rgbd::Zero();
+    Rgbd half[2] = {Rgbd::Zero(), Rgbd::Zero()};
+    Rgbd squares = Rgbd::Zero();
+    double alpha = 0;
+  };
+  const int pixel_count = crop.width * crop.height;
+  std::vector<Sums> sums(static_cast<std::size_t>(pixel_count));
+
+  const auto pass = [&](int first_sample, int last_sample) {
+    // 16 pixels: long enough to pay for a task, short enough to share out a few expensive ones.
+    tbb::parallel_for(tbb::blocked_range<int>(0, pixel_count, 16), [&](const tbb::blocked_range<int>& range) {
+      for (int k = range.begin(); k < range.end(); ++k) {
+        const int x = crop.x0 + k % crop.width;
+        const int y = crop.y0 + k / crop.width;
+        const auto pixel = static_cast<std::uint64_t>(y) * static_cast<std::uint64_t>(camera.width()) +
+                           static_cast<std::uint64_t>(x);
+        Sums& sum = sums[static_cast<std::size_t>(k)];
+        for (int s = first_sample; s < last_sample; ++s) {
+          RandomStream eye(seed, RandomStage::kEyeRay, pixel, static_cast<std::uint64_t>(s));
+          RandomStream random(seed, RandomStage::kPathTracer, pixel, static_cast<std::uint64_t>(s));
+          const double px = x + eye.uniform_double();
+          const double py = y + eye.uniform_double();
+          const PathTracer::Sample sample = tracer.trace(camera.ray(px, py), random);
+          const Rgbd total = (sample.single + sample.multiple + sample.background).cast<double>();
+          sum.single += sample.single.cast<double>();
+          sum.multiple += sample.multiple.cast<double>();
+          sum.half[s % 2] += total;
+          sum.squares += total * total;
+          sum.alpha += static_cast<double>(sample.alpha);
+        }
+      }
+    });
+  };
+
+  const auto start = std::chrono::steady_clock::now();
+  int done = 0;
+  for (double share = 0; share < 1;) {
+    progress(share);
+    const int count = budget.seconds ? 2 : std::min(8, budget.spp - done);
+    pass(done, done + count);
+    done += count;
+    const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
+    share = budget.seconds ? spent.count() / *budget.seconds : static_cast<double>(done) / budget.spp;
+  }
+  progress(1.0);
+
+  FrameBuffers frame(crop.width, crop.height);
+  frame.spp = done;
+  frame.half0.resize(sums.size());
+  frame.half1.resize(sums.size());
+  frame.variance.resize(sums.size());
+  for (std::size_t k = 0; k < sums.size(); ++k) {
+    const Sums& sum = sums[k];
+    const double n = done;
+    const Rgbd mean = (sum.half[0] + sum.half[1]) / n;
+    frame.beauty[k] = mean.cast<float>();
+    frame.single[k] = (sum.single / n).cast<float>();
+    frame.multiple[k] = (sum.multiple / n).cast<float>();
+    frame.alpha[k] = static_cast<float>(sum.alpha / n);
+    frame.half0[k] = (sum.half[0] / (0.5 * n)).cast<float>();
+    frame.half1[k] = (sum.half[1] / (0.5 * n)).cast<float>();
+    frame.variance[k] = ((sum.squares / n - mean * mean).max(0.0) / (n - 1)).cast<float>();
+  }
+  return frame;
+}
+
+}  // namespace heddle

@@ -1,0 +1,86 @@
+#ifndef HEDDLE_RENDER_PATH_TRACER_H_
+#define HEDDLE_RENDER_PATH_TRACER_H_
+// The reference: eye paths among the shell-mapped explicit fibers, by the same walk and the same BCSDF as the
+// transfer stage, with the light found by shadow rays at every vertex and by paths that escape, combined by
+// the power heuristic (Veach 1997). `single` is light scattered once, `multiple` the rest.
+//
+// Local pictures (paths end where they leave the shell) keep the shadows of all cloth and meshes: what the
+// precomputed methods claim to match. Random numbers are addressed by (seed, pixel of the full frame, sample)
+// and sums run in sample order, so a picture depends neither on threads nor on the crop. Tested in
+// tests/render/path_tracer_test.cpp.
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "fibers/math/random.h"
+#include "fibers/scattering/bcsdf_table.h"
+#include "fibers/tracing/path_walk.h"
+#include "render/camera.h"
+#include "render/cloth_scene.h"
+#include "render/cloth_trace.h"
+#include "render/lights.h"
+#include "render/render_output.h"
+
+namespace heddle {
+
+/// How light is found: by shadow rays alone, by escaping paths alone (which never meet a directional light),
+/// or both.
+enum class LightEstimator : std::uint8_t { kShadowRays, kEscapes, kCombined };
+
+struct PathTracerSettings {
+  std::uint64_t seed = 1;
+  bool local = false;
+  LightEstimator estimator = LightEstimator::kCombined;
+  WalkLimits limits;
+};
+
+class PathTracer {
+ public:
+  /// materials: [ClothScene::materials()], see scene_materials(). All references must outlive the tracer.
+  PathTracer(const ClothScene& scene, std::span<const BcsdfTable> materials, std::span<const Light> lights,
+             const Rgb& background, const PathTracerSettings& settings);
+
+  struct Sample {
+    Rgb single = Rgb::Zero();
+    Rgb multiple = Rgb::Zero();
+    Rgb background = Rgb::Zero();
+    float alpha = 0;  // 1 where the eye ray meets cloth or a mesh
+  };
+  /// Radiance that comes back along one eye ray.
+  Sample trace(const EyeRay& ray, RandomStream& random) const;
+  /// The same for light leaving a known vertex towards `wo`.
+  Sample radiance(const ClothTrace::Vertex& vertex, const Vec3& wo, RandomStream& random) const;
+
+ private:
+  const ClothScene* scene_;
+  std::span<const BcsdfTable> materials_;
+  std::span<const Light> lights_;
+  Rgb background_;
+  PathTracerSettings settings_;
+  ClothTrace trace_;
+};
+
+/// BCSDF tables of all materials of a scene.
+std::vector<BcsdfTable> scene_materials(const ClothScene& scene);
+
+/// Either a number of samples per pixel (even, at least 2) or a time; a timed picture is made of whole passes
+/// of two samples per pixel, at least one.
+struct SampleBudget {
+  int spp = 2;
+  std::optional<double> seconds;
+};
+
+/// Called between passes with the share done, 0 .. 1; may throw to stop.
+using RenderProgress = std::function<void(double)>;
+
+/// Beauty, single, multiple, alpha, half0 (even samples), half1 (odd samples), variance of the pixel's mean;
+/// spp done.
+FrameBuffers trace_picture(const PathTracer& tracer, const Camera& camera, const PixelRect& crop,
+                           std::uint64_t seed, const SampleBudget& budget, const RenderProgress& progress);
+
+}  // namespace heddle
+
+#endif  // HEDDLE_RENDER_PATH_TRACER_H_

@@ -1,0 +1,69 @@
+#include "render/render_output.h"
+
+#include <array>
+
+#include "formats/input_error.h"
+
+namespace heddle {
+
+namespace {
+
+constexpr std::array<const char*, 3> kColorChannels = {"R", "G", "B"};
+
+std::string channel_name(const std::string& layer, const std::string& channel) {
+  return layer.empty() ? channel : layer + "." + channel;
+}
+
+template <class Triples>
+void add_triples(Image& image, const Triples& values, ChannelType type,
+                 const std::array<std::string, 3>& names) {
+  if (values.empty()) return;
+  for (int k = 0; k < 3; ++k) {
+    ImageChannel channel{type, {}, {}};
+    channel.values.reserve(values.size());
+    for (const auto& value : values) channel.values.push_back(value[k]);
+    image.channels[names[static_cast<std::size_t>(k)]] = std::move(channel);
+  }
+}
+
+void add_color(Image& image, const std::string& layer, const std::vector<Rgb>& values, ChannelType type) {
+  add_triples(image, values, type,
+              {channel_name(layer, "R"), channel_name(layer, "G"), channel_name(layer, "B")});
+}
+
+}  // namespace
+
+Image image_of(const FrameBuffers& frame, const std::map<std::string, std::string>& metadata) {
+  Image image;
+  image.width = frame.width;
+  image.height = frame.height;
+  image.metadata = metadata;
+  add_color(image, "", frame.beauty, ChannelType::kHalf);
+  image.channels["A"] = {ChannelType::kHalf, frame.alpha, {}};
+  add_color(image, "single", frame.single, ChannelType::kHalf);
+  add_color(image, "multiple", frame.multiple, ChannelType::kHalf);
+  add_color(image, "half0", frame.half0, ChannelType::kHalf);
+  add_color(image, "half1", frame.half1, ChannelType::kHalf);
+  add_color(image, "Variance", frame.variance, ChannelType::kFloat);
+  add_triples(image, frame.fabric_position, ChannelType::kFloat, {"u", "v", "w"});
+  add_triples(image, frame.tangent, ChannelType::kFloat, {"tangent.X", "tangent.Y", "tangent.Z"});
+  if (!frame.depth.empty()) image.channels["Z"] = {ChannelType::kFloat, frame.depth, {}};
+  if (!frame.segment.empty()) image.channels["segment"] = {ChannelType::kUint, {}, frame.segment};
+  if (!frame.cell.empty()) image.channels["cell"] = {ChannelType::kUint, {}, frame.cell};
+  return image;
+}
+
+std::vector<Rgb> layer_of(const Image& image, const std::string& layer, const std::string& name) {
+  std::vector<Rgb> colors(static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height));
+  for (int c = 0; c < 3; ++c) {
+    const std::string channel = channel_name(layer, kColorChannels[static_cast<std::size_t>(c)]);
+    const auto found = image.channels.find(channel);
+    if (found == image.channels.end() || found->second.type == ChannelType::kUint) {
+      throw FileError(name + ": no colour channel '" + channel + "'");
+    }
+    for (std::size_t k = 0; k < colors.size(); ++k) colors[k][c] = found->second.values[k];
+  }
+  return colors;
+}
+
+}  // namespace heddle

@@ -1,0 +1,62 @@
+#ifndef HEDDLE_RENDER_RENDER_OUTPUT_H_
+#define HEDDLE_RENDER_RENDER_OUTPUT_H_
+// The buffers of a picture and their form as image layers: beauty R, G, B, A; single.*, multiple.*; half0.*,
+// half1.* and Variance.* of the path tracer; of the precomputed methods segment, cell (ids, 0xffffffff =
+// none), u, v, w (fabric position of the hit, mm), Z (distance along the view direction, mm; 0 = nothing
+// hit), tangent.X/Y/Z (world). Row-major, row 0 at the top. Tested in tests/render/render_output_test.cpp.
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "fibers/math/vector.h"
+#include "formats/image_file.h"
+
+namespace heddle {
+
+struct FrameBuffers {
+  FrameBuffers() = default;
+  FrameBuffers(int width_px, int height_px)
+      : width(width_px),
+        height(height_px),
+        beauty(pixel_count(), Rgb::Zero()),
+        single(pixel_count(), Rgb::Zero()),
+        multiple(pixel_count(), Rgb::Zero()),
+        alpha(pixel_count(), 0.0F) {}
+
+  int width = 0;
+  int height = 0;
+  int spp = 0;
+  std::vector<Rgb> beauty;    // [pixel] single + multiple + background
+  std::vector<Rgb> single;    // [pixel]
+  std::vector<Rgb> multiple;  // [pixel]
+  std::vector<float> alpha;   // [pixel] share of eye rays that meet cloth or a mesh
+
+  // Path tracer only, else empty.
+  std::vector<Rgb> half0;     // [pixel] beauty of the even samples
+  std::vector<Rgb> half1;     // [pixel] beauty of the odd samples
+  std::vector<Rgb> variance;  // [pixel] of the mean in `beauty`, estimated
+
+  // Precomputed methods only, else empty: the eye ray through the first sample of each pixel.
+  std::vector<std::uint32_t> segment;  // [pixel]
+  std::vector<std::uint32_t> cell;     // [pixel]
+  std::vector<Vec3> fabric_position;   // [pixel] mm
+  std::vector<float> depth;            // [pixel] mm
+  std::vector<Vec3> tangent;           // [pixel]
+
+  std::size_t pixel_count() const {
+    return static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+  }
+};
+
+Image image_of(const FrameBuffers& frame, const std::map<std::string, std::string>& metadata);
+
+/// The colours of a layer ("" = beauty, "half0", ...) back from an image. Errors: FileError where a channel
+/// is missing; `name` is the file named in the message.
+std::vector<Rgb> layer_of(const Image& image, const std::string& layer, const std::string& name);
+
+}  // namespace heddle
+
+#endif  // HEDDLE_RENDER_RENDER_OUTPUT_H_

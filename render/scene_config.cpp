@@ -1,0 +1,134 @@
+#include "render/scene_config.h"
+
+#include <cmath>
+
+namespace heddle {
+
+namespace {
+
+constexpr NumberRange kAnyLength{-1e6, 1e6};
+constexpr NumberRange kSize{0, 1e5, true};
+constexpr NumberRange kComponent{-1e6, 1e6};
+constexpr NumberRange kLight{0, 1e9};
+
+Vec3d vector_of(const std::array<double, 3>& values) {
+  return {values[0], values[1], values[2]};
+}
+
+Vec3d unit_vector(const TomlTable& table, std::string_view key) {
+  const Vec3d value = vector_of(table.number3(key, kComponent));
+  if (value.norm() < 1e-9) table.fail(key, "expected a direction, not the zero vector");
+  return value.normalized();
+}
+
+Rgb color(const std::array<double, 3>& values) {
+  return vector_of(values).cast<float>().array();
+}
+
+CameraConfig read_camera(const TomlTable& table) {
+  CameraConfig camera;
+  camera.position = vector_of(table.number3("position_mm", kAnyLength));
+  camera.look_at = vector_of(table.number3("look_at_mm", kAnyLength));
+  camera.up = vector_of(table.number3("up", kComponent, std::array<double, 3>{0, 0, 1}));
+  camera.fov = radians(table.number("fov_deg", {0, 170, true}));
+  camera.fov_axis = table.choice("fov_axis", {"horizontal", "vertical"}) == "horizontal"
+                        ? FovAxis::kHorizontal
+                        : FovAxis::kVertical;
+  const std::array<double, 2> resolution = table.number2("resolution_px", {1, 16384});
+  if (resolution[0] != std::floor(resolution[0]) || resolution[1] != std::floor(resolution[1])) {
+    table.fail("resolution_px", "expected whole numbers of pixels");
+  }
+  camera.width = static_cast<int>(resolution[0]);
+  camera.height = static_cast<int>(resolution[1]);
+  const Vec3d view = camera.look_at - camera.position;
+  if (view.norm() < 1e-9) table.fail("look_at_mm", "expected a point different from position_mm");
+  // Below a milliradian the picture's upright direction would be decided by rounding.
+  if (view.normalized().cross(camera.up).norm() < 1e-3 * camera.up.norm() || camera.up.norm() < 1e-9) {
+    table.fail("up", "expected a direction that is not parallel to the view direction");
+  }
+  return camera;
+}
+
+Light read_light(const TomlTable& table) {
+  Light light;
+  if (table.choice("type", {"directional", "sg"}) == "directional") {
+    light.type = LightType::kDirectional;
+    light.axis = unit_vector(table, "direction").cast<float>();
+  } else {
+    light.type = LightType::kSphericalGaussian;
+    light.axis = unit_vector(table, "axis").cast<float>();
+    light.sharpness = static_cast<float>(table.number("sharpness", {0, 1e6}));
+  }
+  light.irradiance = color(table.number3("irradiance", kLight));
+  return light;
+}
+
+MeshFile read_mesh(const TomlTable& table) {
+  MeshFile mesh;
+  mesh.path = table.existing_file("mesh");
+  const std::string unit = table.choice("mesh_unit", {"m", "cm", "mm"});
+  mesh.mm_per_unit = unit == "m" ? 1000.0 : (unit == "cm" ? 10.0 : 1.0);
+  return mesh;
+}
+
+ClothConfig read_cloth(const TomlTable& table) {
+  ClothConfig cloth;
+  if (table.has("mesh") == table.has("flat_mm")) table.fail("mesh", "expected either mesh or flat_mm");
+  if (table.has("mesh")) {
+    cloth.mesh = read_mesh(table);
+    cloth.uv_size_mm = table.number("uv_size_mm", kSize);
+  } else {
+    const std::array<double, 2> size = table.number2("flat_mm", kSize);
+    cloth.flat_width_mm = size[0];
+    cloth.flat_height_mm = size[1];
+  }
+  cloth.fabric = table.existing_file("fabric");
+  cloth.underlay = table.boolean("underlay", false);
+  return cloth;
+}
+
+}  // namespace
+
+std::optional<RenderMethod> render_method_of(std::string_view name) {
+  for (const RenderMethod method : {RenderMethod::kExact, RenderMethod::kVolume, RenderMethod::kPath}) {
+    if (name == render_method_name(method)) return method;
+  }
+  return {};
+}
+
+const char* render_method_name(RenderMethod method) {
+  switch (method) {
+    case RenderMethod::kExact:
+      return "exact";
+    case RenderMethod::kVolume:
+      return "volume";
+    case RenderMethod::kPath:
+      return "path";
+  }
+  return "";
+}
+
+SceneConfig read_scene_config(const TomlTable& document) {
+  SceneConfig scene;
+  scene.name = document.string("name");
+  scene.background = color(document.number3("background", kLight, std::array<double, 3>{0, 0, 0}));
+  scene.camera = read_camera(document.table("camera"));
+  for (const TomlTable& table : document.tables("light")) scene.lights.push_back(read_light(table));
+  if (scene.lights.empty()) document.fail("light", "expected at least one [[light]]");
+  for (const TomlTable& table : document.tables("cloth")) scene.cloths.push_back(read_cloth(table));
+  if (scene.cloths.empty()) document.fail("cloth", "expected at least one [[cloth]]");
+  for (const TomlTable& table : document.tables("mesh")) scene.meshes.push_back(read_mesh(table));
+  if (const std::optional<TomlTable> render = document.optional_table("render")) {
+    scene.method = *render_method_of(render->choice("method", {"exact", "volume", "path"}, "exact"));
+    scene.spp = static_cast<int>(render->integer("spp", 1, 1 << 24, 16));
+    scene.seed = static_cast<std::uint64_t>(render->integer("seed", 0, INT64_MAX, 1));
+    scene.shadow_sigma_mm = render->optional_number("shadow_sigma_mm", {0, 1e3});
+    if (scene.method == RenderMethod::kPath && scene.spp % 2 != 0) {
+      render->fail("spp", "expected an even number: the path tracer keeps two half pictures");
+    }
+  }
+  document.finish();
+  return scene;
+}
+
+}  // namespace heddle

@@ -1,0 +1,63 @@
+#ifndef HEDDLE_RENDER_SCENE_CONFIG_H_
+#define HEDDLE_RENDER_SCENE_CONFIG_H_
+// What a scene TOML says: camera, lights, pieces of cloth, black meshes, how to render. Keys, units and
+// ranges: configs/README.md. Lengths in millimetres, angles in radians after parsing. Errors: ConfigError
+// with its place. Tested in tests/render/scene_config_test.cpp.
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "fibers/math/vector.h"
+#include "formats/toml_table.h"
+#include "render/camera.h"
+#include "render/lights.h"
+
+namespace heddle {
+
+enum class RenderMethod : std::uint8_t {
+  kExact,   // precomputed shading, eye rays against the fibers
+  kVolume,  // precomputed shading, eye rays through the id volume
+  kPath,    // the path-traced reference
+};
+
+struct MeshFile {
+  std::filesystem::path path;
+  double mm_per_unit = 1;
+};
+
+struct ClothConfig {
+  std::optional<MeshFile> mesh;  // an OBJ with UVs, or else a flat swatch
+  double uv_size_mm = 0;         // flat cloth (mm) per unit of UV; meshes only
+  double flat_width_mm = 0;      // flat swatch centred on the world's origin, z = 0; x = weft, y = warp
+  double flat_height_mm = 0;
+  std::filesystem::path fabric;  // fabric TOML
+  bool underlay = false;         // a black copy of the cloth's underside just below it
+};
+
+struct SceneConfig {
+  std::string name;
+  CameraConfig camera;
+  std::vector<Light> lights;
+  Rgb background = Rgb(0, 0, 0);  // radiance seen by eye rays that hit nothing; lights nothing
+  std::vector<ClothConfig> cloths;
+  std::vector<MeshFile> meshes;  // black
+  RenderMethod method = RenderMethod::kExact;
+  int spp = 16;  // samples per pixel; even for kPath
+  std::uint64_t seed = 1;
+  std::optional<double> shadow_sigma_mm;  // smoothing of global visibility; from the fabric where absent
+};
+
+/// Reads a whole scene document, finish() included.
+SceneConfig read_scene_config(const TomlTable& document);
+
+/// "exact", "volume" or "path"; nothing for another name.
+std::optional<RenderMethod> render_method_of(std::string_view name);
+const char* render_method_name(RenderMethod method);
+
+}  // namespace heddle
+
+#endif  // HEDDLE_RENDER_SCENE_CONFIG_H_

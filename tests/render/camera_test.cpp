@@ -1,0 +1,62 @@
+#include "render/camera.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <sstream>
+
+namespace heddle {
+namespace {
+
+CameraConfig oblique() {
+  CameraConfig config;
+  config.position = {30, -80, 50};
+  config.look_at = {1, 2, 3};
+  config.up = {0, 0, 1};
+  config.fov = radians(40);
+  config.width = 200;
+  config.height = 100;
+  return config;
+}
+
+TEST(Camera, CentreLooksAtTheTarget) {
+  const CameraConfig config = oblique();
+  const Camera camera(config);
+  const EyeRay ray = camera.ray(100, 50);
+  EXPECT_LT((ray.direction.cast<double>() - (config.look_at - config.position).normalized()).norm(), 1e-6);
+  EXPECT_NEAR(camera.depth(config.look_at), (config.look_at - config.position).norm(), 1e-9);
+}
+
+double angle(const EyeRay& a, const EyeRay& b) {
+  return std::acos(a.direction.cast<double>().normalized().dot(b.direction.cast<double>().normalized()));
+}
+
+TEST(Camera, FieldOfViewSpansTheNamedAxis) {
+  CameraConfig config = oblique();
+  EXPECT_NEAR(angle(Camera(config).ray(0, 50), Camera(config).ray(200, 50)), config.fov, 1e-6);
+  config.fov_axis = FovAxis::kVertical;
+  EXPECT_NEAR(angle(Camera(config).ray(100, 0), Camera(config).ray(100, 100)), config.fov, 1e-6);
+}
+
+TEST(Camera, PixelsAreSquareAndRowZeroIsUp) {
+  const Camera camera(oblique());
+  EXPECT_GT(camera.ray(100, 0).direction.z(), camera.ray(100, 100).direction.z());
+  const auto tangent = [&](double x, double y) {
+    return std::tan(angle(camera.ray(100, 50), camera.ray(x, y)));
+  };
+  EXPECT_NEAR(tangent(140, 50), tangent(100, 10), 1e-6);
+}
+
+TEST(Camera, WorldToCameraTextMapsTheTargetOntoTheAxis) {
+  const CameraConfig config = oblique();
+  std::istringstream text(Camera(config).world_to_camera_text());
+  Eigen::Matrix4d matrix;
+  for (int k = 0; k < 16; ++k) ASSERT_TRUE(text >> matrix(k / 4, k % 4));
+  const Eigen::Vector4d seen = matrix * config.look_at.homogeneous();
+  EXPECT_NEAR(seen.x(), 0, 1e-6);
+  EXPECT_NEAR(seen.y(), 0, 1e-6);
+  EXPECT_NEAR(seen.z(), -(config.look_at - config.position).norm(), 1e-6);
+}
+
+}  // namespace
+}  // namespace heddle

@@ -1,0 +1,323 @@
+#include "render/path_tracer.h"
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <cmath>
+#include <memory>
+
+#include "fibers/math/quadrature.h"
+#include "fibers/math/spherical_gaussian.h"
+#include "tests/support/small_exemplars.h"
+#include "tests/support/statistics.h"
+
+namespace heddle {
+namespace {
+
+Light sg_light(const Vec3& axis, float sharpness, const Rgb& irradiance) {
+  return {LightType::kSphericalGaussian, axis.normalized(), sharpness, irradiance};
+}
+
+struct World {
+  std::unique_ptr<ClothScene> scene;
+  std::vector<BcsdfTable> materials;
+  std::vector<Light> lights;
+
+  PathTracer tracer(LightEstimator estimator, bool local = false, int max_scatterings = 4096) const {
+    PathTracerSettings settings;
+    settings.estimator = estimator;
+    settings.local = local;
+    settings.limits.max_scatterings = max_scatterings;
+    return {*scene, materials, lights, Rgb(0, 0, 0), settings};
+  }
+};
+
+World make_world(Exemplar exemplar, std::vector<ClothMesh> meshes, std::vector<Light> lights) {
+  World world;
+  const auto tile = std::make_shared<TileScene>(std::move(exemplar));
+  std::vector<ClothPiece> pieces;
+  for (ClothMesh& mesh : meshes) pieces.push_back({tile, std::move(mesh)});
+  world.scene = std::make_unique<ClothScene>(std::move(pieces), std::vector<TriangleMesh>{});
+  world.materials = scene_materials(*world.scene);
+  world.lights = std::move(lights);
+  return world;
+}
+
+// A patch of a cylinder of radius 6 mm, 6 mm wide: fabric space is bent but not stretched.
+ClothMesh curved_patch() {
+  constexpr int kSteps = 24;
+  constexpr double kRadius = 6;
+  ClothMesh mesh;
+  for (int i = 0; i <= kSteps; ++i) {
+    const double angle = (static_cast<double>(i) / kSteps - 0.5) * 2.4;
+    for (const double y : {-3.0, 3.0}) {
+      mesh.normals.emplace_back(std::sin(angle), 0, std::cos(angle));
+      mesh.positions.push_back(kRadius * mesh.normals.back() + Vec3d(0, y, -kRadius));
+      mesh.fabric.emplace_back(kRadius * angle, y);
+    }
+  }
+  for (std::uint32_t i = 0; i < kSteps; ++i) {
+    const std::uint32_t v = 2 * i;
+    mesh.triangles.push_back({v, v + 2, v + 3});
+    mesh.triangles.push_back({v, v + 3, v + 1});
+  }
+  return mesh;
+}
+
+// Mean and standard error of each colour over eye rays onto the middle of the cloth; rays that miss do not
+// count.
+struct Means {
+  RunningMean total[3];
+  RunningMean single[3];
+};
+Means measure(const PathTracer& tracer, int samples, std::uint64_t seed) {
+  Means means;
+  for (int k = 0; k < samples; ++k) {
+    RandomStream random(seed, RandomStage::kTest, static_cast<std::uint64_t>(k), 0);
+    const Vec3d target(1.5 * random.uniform_double() - 0.75, 1.5 * random.uniform_double() - 0.75, 0);
+    const Vec3 direction = Vec3(0.3F, 0.2F, -1).normalized();
+    const PathTracer::Sample sample =
+        tracer.trace({target - 20 * direction.cast<double>(), direction}, random);
+    if (sample.alpha == 0) continue;
+    for (int c = 0; c < 3; ++c) {
+      means.total[c].add(static_cast<double>(sample.single[c] + sample.multiple[c]));
+      means.single[c].add(static_cast<double>(sample.single[c]));
+    }
+  }
+  return means;
+}
+
+// Furnace: fibers that scatter everything evenly, in light 1 from everywhere, are invisible. With sampling by
+// the BCSDF every path weighs 1 whatever it hits; shadow rays and the combination judge the geometry of
+// occlusion.
+TEST(PathTracerLaw, Furnace) {
+  const std::vector<Light> light = {sg_light({0, 0, 1}, 0, Rgb(1, 1, 1) * static_cast<float>(4 * kPi))};
+  for (const bool curved : {false, true}) {
+    const World world =
+        make_world(crossed_layers(white_isotropic()), {curved ? curved_patch() : flat_cloth(6, 6)}, light);
+    const Means escapes = measure(world.tracer(LightEstimator::kEscapes), 2000, 1);
+    EXPECT_NEAR(escapes.total[0].mean(), 1, 1e-4);
+    EXPECT_LT(escapes.total[0].standard_error(), 1e-4);
+    for (const LightEstimator estimator : {LightEstimator::kShadowRays, LightEstimator::kCombined}) {
+      const Means means = measure(world.tracer(estimator), 20000, 2);
+      EXPECT_TRUE(
+          means_agree(estimator == LightEstimator::kShadowRays ? "furnace, shadow rays" : "furnace, combined",
+                      means.total[0].mean(), means.total[0].standard_error(), 1, 0, 4));
+    }
+    EXPECT_EQ(world.scene->failed_walks(), 0U);
+  }
+}
+
+// The same furnace seen with the roulette and the limits of a path that loses its light: breaking either
+// shows.
+TEST(PathTracerLaw, FurnaceSeesALostBounce) {
+  const std::vector<Light> light = {sg_light({0, 0, 1}, 0, Rgb(1, 1, 1) * static_cast<float>(4 * kPi))};
+  const World world = make_world(crossed_layers(white_isotropic()), {flat_cloth(6, 6)}, light);
+  EXPECT_LT(measure(world.tracer(LightEstimator::kCombined, false, 10), 2000, 3).total[0].mean(), 0.99);
+}
+
+TEST(PathTracerStatistical, EstimatorsAgreeUnderASharpGaussian) {
+  const World world = make_world(crossed_layers(test_cotton()), {curved_patch()},
+                                 {sg_light({-0.4F, 0.3F, 1}, 150, Rgb(3, 3, 3))});
+  const Means shadow = measure(world.tracer(LightEstimator::kShadowRays), 40000, 4);
+  const Means escapes = measure(world.tracer(LightEstimator::kEscapes), 200000, 5);
+  const Means combined = measure(world.tracer(LightEstimator::kCombined), 40000, 6);
+  for (const int c : {0, 2}) {
+    const auto agree = [&](const char* name, const RunningMean& a, const RunningMean& b) {
+      EXPECT_TRUE(means_agree(name, a.mean(), a.standard_error(), b.mean(), b.standard_error(), 8));
+    };
+    agree("shadow rays, combined", shadow.total[c], combined.total[c]);
+    agree("escapes, combined", escapes.total[c], combined.total[c]);
+    agree("single: shadow rays, combined", shadow.single[c], combined.single[c]);
+    agree("single: escapes, combined", escapes.single[c], combined.single[c]);
+  }
+}
+
+TEST(PathTracerStatistical, AVerySharpGaussianIsADirectionalLight) {
+  const Vec3 axis = Vec3(-0.4F, 0.3F, 1).normalized();
+  const Rgb irradiance(2, 3, 4);
+  const World sharp =
+      make_world(crossed_layers(test_cotton()), {curved_patch()}, {sg_light(axis, 1e5F, irradiance)});
+  const World directional = make_world(crossed_layers(test_cotton()), {curved_patch()},
+                                       {{LightType::kDirectional, axis, 0, irradiance}});
+  const Means a = measure(sharp.tracer(LightEstimator::kCombined), 40000, 7);
+  const Means b = measure(directional.tracer(LightEstimator::kCombined), 40000, 8);
+  for (int c = 0; c < 3; ++c) {
+    EXPECT_TRUE(means_agree("sharp against directional", a.total[c].mean(), a.total[c].standard_error(),
+                            b.total[c].mean(), b.total[c].standard_error(), 3));
+  }
+}
+
+// One fiber alone: all its copies are the same fiber, so nothing occludes, and the radiance is an integral
+// over the light.
+TEST(PathTracerStatistical, SingleFiberAgainstQuadrature) {
+  const FiberScattering fiber = test_cotton();
+  const Light light = sg_light({0.3F, 0.5F, 0.8F}, 20, Rgb(1, 2, 3));
+  // The swatch is turned, so that the fiber's tangent (fabric y) is a general direction of the world.
+  const Mat3d turn = Eigen::AngleAxisd(0.7, Vec3d(1, 2, 3).normalized()).toRotationMatrix();
+  ClothMesh mesh = flat_cloth(10, 10);
+  for (Vec3d& p : mesh.positions) p = turn * p;
+  for (Vec3d& n : mesh.normals) n = turn * n;
+  const World world = make_world(single_fiber(fiber), {mesh}, {light});
+  const Vec3d tangent = turn * Vec3d(0, 1, 0);
+  const Vec3d view = turn * Vec3d(0.1, 0.4, 1).normalized();
+  const Vec3 direction = (-view).cast<float>();
+  const Vec3d origin = turn * Vec3d(0.5, 0.2, 0) + 5 * view;
+
+  const Mat3d frame = frame_about(tangent.cast<float>()).cast<double>();
+  const SphericalGaussian gaussian = {frame.transpose() * light.axis.cast<double>(), 20.0};
+  const Vec3d wo = frame.transpose() * view;
+  Rgbd expected = Rgbd::Zero();
+  constexpr int kPanels = 24;
+  constexpr double step = kPi / kPanels;
+  for (int row = 0; row < kPanels; ++row) {
+    for (int column = 0; column < 2 * kPanels; ++column) {
+      const QuadratureRule thetas = gauss_legendre(5, row * step - kPi / 2, (row + 1) * step - kPi / 2);
+      const QuadratureRule phis = gauss_legendre(5, column * step, (column + 1) * step);
+      for (std::size_t i = 0; i < 5; ++i) {
+        for (std::size_t j = 0; j < 5; ++j) {
+          const double cosine = std::cos(thetas.nodes[i]);
+          const Vec3d wi(std::sin(thetas.nodes[i]), cosine * std::cos(phis.nodes[j]),
+                         cosine * std::sin(phis.nodes[j]));
+          expected += evaluate_bcsdf(fiber, wi, wo) * (sg_value(gaussian, wi) / sg_mass(20.0) * cosine *
+                                                       cosine * thetas.weights[i] * phis.weights[j]);
+        }
+      }
+    }
+  }
+  expected *= light.irradiance.cast<double>();
+  for (const LightEstimator estimator :
+       {LightEstimator::kShadowRays, LightEstimator::kEscapes, LightEstimator::kCombined}) {
+    const PathTracer tracer = world.tracer(estimator);
+    RunningMean means[3];
+    for (int k = 0; k < 100000; ++k) {
+      RandomStream random(9, RandomStage::kTest, static_cast<std::uint64_t>(k),
+                          static_cast<std::uint64_t>(estimator));
+      const PathTracer::Sample sample = tracer.trace({origin, direction}, random);
+      ASSERT_EQ(sample.alpha, 1);
+      ASSERT_EQ(sample.multiple.maxCoeff(), 0);
+      for (int c = 0; c < 3; ++c) means[c].add(static_cast<double>(sample.single[c]));
+    }
+    for (int c = 0; c < 3; ++c) {
+      EXPECT_TRUE(means_agree("single fiber", means[c].mean(), means[c].standard_error(), expected[c], 0, 9));
+    }
+  }
+}
+
+TEST(PathTracer, LocalPathsKeepTheShadowsButNotTheLightOfOtherCloth) {
+  ClothMesh wall = flat_cloth(8, 3);  // upright beside the swatch, facing it, below the eye rays
+  for (std::size_t k = 0; k < wall.positions.size(); ++k) {
+    const Vec3d p = wall.positions[k];
+    wall.positions[k] = Vec3d(-2, p.x(), p.y() + 1.5);
+    wall.normals[k] = Vec3d(1, 0, 0);
+  }
+  const std::vector<Light> light = {{LightType::kDirectional, Vec3(0.6F, 0, 0.8F), 0, Rgb(1, 1, 1)}};
+  const World with_wall = make_world(crossed_layers(test_cotton()), {flat_cloth(3, 3), wall}, light);
+  const World alone = make_world(crossed_layers(test_cotton()), {flat_cloth(3, 3)}, light);
+  const Means full = measure(with_wall.tracer(LightEstimator::kCombined), 20000, 10);
+  const Means local = measure(with_wall.tracer(LightEstimator::kCombined, true), 20000, 10);
+  const Means without = measure(alone.tracer(LightEstimator::kCombined, true), 20000, 10);
+  // The lit wall lights the swatch, but not in the local picture: there it could only cast a shadow, and the
+  // light comes from the other side.
+  EXPECT_GT(full.total[0].mean(), local.total[0].mean() + 4 * local.total[0].standard_error());
+  EXPECT_EQ(local.total[0].mean(), without.total[0].mean());
+}
+
+CameraConfig small_camera() {
+  CameraConfig camera;
+  camera.position = {0, -3, 12};
+  camera.fov = radians(30);
+  camera.width = 24;
+  camera.height = 16;
+  return camera;
+}
+
+FrameBuffers small_picture(const PixelRect& crop, int spp) {
+  const World world = make_world(crossed_layers(test_cotton()), {curved_patch()},
+                                 {sg_light({-0.4F, 0.3F, 1}, 150, Rgb(3, 3, 3)),
+                                  {LightType::kDirectional, Vec3(0.6F, 0, 0.8F), 0, Rgb(1, 1, 1)}});
+  const PathTracer tracer = world.tracer(LightEstimator::kCombined);
+  double last = -1;
+  return trace_picture(tracer, Camera(small_camera()), crop, 5, {spp, {}}, [&](double share) {
+    EXPECT_GE(share, last);
+    last = share;
+  });
+}
+
+bool same(const std::vector<Rgb>& a, const std::vector<Rgb>& b) {
+  if (a.size() != b.size()) return false;
+  for (std::size_t k = 0; k < a.size(); ++k) {
+    if ((a[k] != b[k]).any()) return false;
+  }
+  return true;
+}
+
+TEST(PathTracerEndToEnd, ThreadsAndCropsDoNotChangeAPixel) {
+  const PixelRect all = {0, 0, 24, 16};
+  FrameBuffers one;
+  {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, 1);
+    one = small_picture(all, 20);
+  }
+  const FrameBuffers many = small_picture(all, 20);
+  EXPECT_TRUE(same(one.beauty, many.beauty));
+  EXPECT_TRUE(same(one.half0, many.half0));
+  EXPECT_TRUE(same(one.variance, many.variance));
+  const FrameBuffers crop = small_picture({5, 3, 7, 4}, 20);
+  for (int y = 0; y < 4; ++y) {
+    for (int x = 0; x < 7; ++x) {
+      EXPECT_TRUE((crop.beauty[static_cast<std::size_t>(y * 7 + x)] ==
+                   many.beauty[static_cast<std::size_t>((y + 3) * 24 + x + 5)])
+                      .all());
+    }
+  }
+}
+
+// What the buffers say of themselves: the halves average to the beauty, single and multiple add up to it, and
+// the two halves differ as much as the variance says (each half has twice the variance of the mean).
+TEST(PathTracerStatistical, BuffersAreConsistent) {
+  const FrameBuffers frame = small_picture({0, 0, 24, 16}, 64);
+  EXPECT_EQ(frame.spp, 64);
+  double expected = 0;
+  double observed = 0;
+  int lit = 0;
+  for (std::size_t k = 0; k < frame.beauty.size(); ++k) {
+    EXPECT_LT((0.5F * (frame.half0[k] + frame.half1[k]) - frame.beauty[k]).abs().maxCoeff(), 1e-5F);
+    EXPECT_LT((frame.single[k] + frame.multiple[k] - frame.beauty[k]).abs().maxCoeff(), 1e-5F);
+    if (frame.alpha[k] < 1) continue;
+    ++lit;
+    expected += 4 * static_cast<double>(frame.variance[k][1]);
+    const double difference = static_cast<double>(frame.half0[k][1]) - static_cast<double>(frame.half1[k][1]);
+    observed += difference * difference;
+  }
+  // Each term of the sum is a squared normal: relative standard deviation sqrt(2) if all variances were
+  // equal; they differ, so allow twice the count's standard error times 4.
+  std::printf("  %d pixels: squared difference of halves %.4g, expected %.4g\n", lit, observed, expected);
+  EXPECT_GT(lit, 100);
+  EXPECT_NEAR(observed / expected, 1, 4 * 2 * std::sqrt(2.0 / lit));
+}
+
+TEST(PathTracer, TimedPicturesAreWholePasses) {
+  const World world = make_world(crossed_layers(test_cotton()), {curved_patch()},
+                                 {{LightType::kDirectional, Vec3(0.6F, 0, 0.8F), 0, Rgb(1, 1, 1)}});
+  const FrameBuffers frame = trace_picture(world.tracer(LightEstimator::kCombined), Camera(small_camera()),
+                                           {0, 0, 24, 16}, 1, {2, 0.05}, [](double) {});
+  EXPECT_GE(frame.spp, 2);
+  EXPECT_EQ(frame.spp % 2, 0);
+}
+
+TEST(PathTracer, BackgroundIsSeenOnlyByEyeRays) {
+  World world = make_world(crossed_layers(test_cotton()), {flat_cloth(2, 2)}, {});
+  PathTracerSettings settings;
+  const PathTracer tracer(*world.scene, world.materials, world.lights, Rgb(1, 2, 3), settings);
+  RandomStream random(1, RandomStage::kTest, 0, 0);
+  const PathTracer::Sample miss = tracer.trace({Vec3d(50, 0, 5), Vec3(0, 0, -1)}, random);
+  EXPECT_EQ(miss.background[2], 3);
+  EXPECT_EQ(miss.alpha, 0);
+  const PathTracer::Sample hit = tracer.trace({Vec3d(0.013, 0.027, 5), Vec3(0, 0, -1)}, random);
+  EXPECT_EQ(hit.alpha, 1);
+  EXPECT_EQ((hit.single + hit.multiple + hit.background).maxCoeff(), 0);
+}
+
+}  // namespace
+}  // namespace heddle

@@ -1,0 +1,155 @@
+#include "render/scene_config.h"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "formats/input_error.h"
+
+namespace heddle {
+namespace {
+
+// Paths in a scene are relative to its folder: one with the files that the scenes below name.
+class SceneConfigTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = std::filesystem::path(testing::TempDir()) / "heddle_scene_config_test";
+    std::filesystem::create_directories(folder_);
+    std::ofstream(folder_ / "drape.obj") << "v 0 0 0\n";
+    std::ofstream(folder_ / "silk.toml") << "name = \"silk\"\n";
+  }
+  SceneConfig read(const std::string& text) const {
+    const std::filesystem::path path = folder_ / "scene.toml";
+    std::ofstream(path) << text;
+    return read_scene_config(TomlTable::load(path));
+  }
+  std::string message(const std::string& text) const {
+    try {
+      read(text);
+    } catch (const ConfigError& error) {
+      return error.what();
+    }
+    return "";
+  }
+  std::filesystem::path folder_;
+};
+
+const std::string kScene = R"(name = "test"
+background = [0.1, 0.2, 0.3]
+[camera]
+position_mm = [0, -400, 300]
+look_at_mm = [0, 0, 10]
+fov_deg = 30
+fov_axis = "vertical"
+resolution_px = [640, 480]
+[[light]]
+type = "directional"
+direction = [0, 3, 4]
+irradiance = [1, 2, 3]
+[[light]]
+type = "sg"
+axis = [0, 0, 2]
+sharpness = 0
+irradiance = [4, 5, 6]
+[[cloth]]
+mesh = "drape.obj"
+mesh_unit = "m"
+uv_size_mm = 300
+fabric = "silk.toml"
+underlay = true
+[[cloth]]
+flat_mm = [30, 20]
+fabric = "silk.toml"
+[[mesh]]
+mesh = "drape.obj"
+mesh_unit = "cm"
+[render]
+method = "path"
+spp = 64
+seed = 7
+shadow_sigma_mm = 0.5
+)";
+
+std::string with(std::string text, const std::string& from, const std::string& to) {
+  const std::size_t at = text.find(from);
+  EXPECT_NE(at, std::string::npos) << from;
+  return text.replace(at, from.size(), to);
+}
+
+TEST_F(SceneConfigTest, ReadsEveryKey) {
+  const SceneConfig scene = read(kScene);
+  EXPECT_EQ(scene.name, "test");
+  EXPECT_EQ(scene.camera.fov_axis, FovAxis::kVertical);
+  EXPECT_NEAR(scene.camera.fov, radians(30), 1e-12);
+  EXPECT_EQ(scene.camera.width, 640);
+  EXPECT_EQ(scene.camera.up, Vec3d(0, 0, 1));
+  ASSERT_EQ(scene.lights.size(), 2U);
+  EXPECT_NEAR(scene.lights[0].axis.y(), 0.6, 1e-6);
+  EXPECT_EQ(scene.lights[1].type, LightType::kSphericalGaussian);
+  EXPECT_EQ(scene.lights[1].irradiance[2], 6);
+  ASSERT_EQ(scene.cloths.size(), 2U);
+  EXPECT_EQ(scene.cloths[0].mesh->mm_per_unit, 1000);
+  EXPECT_TRUE(scene.cloths[0].underlay);
+  EXPECT_FALSE(scene.cloths[1].mesh);
+  EXPECT_EQ(scene.cloths[1].flat_height_mm, 20);
+  EXPECT_FALSE(scene.cloths[1].underlay);
+  ASSERT_EQ(scene.meshes.size(), 1U);
+  EXPECT_EQ(scene.meshes[0].mm_per_unit, 10);
+  EXPECT_EQ(scene.method, RenderMethod::kPath);
+  EXPECT_EQ(scene.spp, 64);
+  EXPECT_EQ(scene.seed, 7U);
+  EXPECT_EQ(scene.shadow_sigma_mm, 0.5);
+  EXPECT_NEAR(scene.background[1], 0.2, 1e-7);
+}
+
+TEST_F(SceneConfigTest, Defaults) {
+  const SceneConfig scene = read(kScene.substr(0, kScene.find("[render]")));
+  EXPECT_EQ(scene.method, RenderMethod::kExact);
+  EXPECT_FALSE(scene.shadow_sigma_mm);
+}
+
+TEST_F(SceneConfigTest, MistakesAreLocated) {
+  struct Case {
+    const char* from;
+    const char* to;
+    const char* expected;
+  };
+  const Case cases[] = {
+      {"fov_deg = 30", "fov_deg = 0", "scene.toml:6"},
+      {"fov_axis = \"vertical\"\n", "", "fov_axis"},
+      {"resolution_px = [640, 480]", "resolution_px = [640, 480.5]", "scene.toml:8"},
+      {"look_at_mm = [0, 0, 10]", "look_at_mm = [0, -400, 300]", "scene.toml:5"},
+      {"look_at_mm = [0, 0, 10]", "look_at_mm = [0, -400, 10]", "parallel"},
+      {"direction = [0, 3, 4]", "direction = [0, 0, 0]", "scene.toml:11"},
+      {"sharpness = 0", "sharpness = -1", "scene.toml:16"},
+      {"type = \"sg\"", "type = \"point\"", "scene.toml:14"},
+      {"irradiance = [1, 2, 3]", "irradiance = [1, -2, 3]", "scene.toml:12"},
+      {"mesh_unit = \"m\"\n", "", "mesh_unit"},
+      {"mesh_unit = \"m\"", "mesh_unit = \"inch\"", "scene.toml:20"},
+      {"flat_mm = [30, 20]", "flat_mm = [30, 20]\nuv_size_mm = 3", "uv_size_mm"},
+      {"flat_mm = [30, 20]", "flat_mm = [30, 20]\nmesh = \"drape.obj\"", "either"},
+      {"fabric = \"silk.toml\"", "fabric = \"wool.toml\"", "wool.toml"},
+      {"spp = 64", "spp = 63", "even"},
+      {"name = \"test\"", "name = \"test\"\nnmae = 3", "nmae"},
+  };
+  for (const Case& c : cases) {
+    const std::string text = message(with(kScene, c.from, c.to));
+    EXPECT_NE(text.find(c.expected), std::string::npos) << c.to << "\n" << text;
+  }
+}
+
+TEST_F(SceneConfigTest, ASceneNeedsLightAndCloth) {
+  EXPECT_NE(message("name = \"a\"\n" + kScene.substr(kScene.find("[camera]"),
+                                                     kScene.find("[[light]]") - kScene.find("[camera]")))
+                .find("[[light]]"),
+            std::string::npos);
+}
+
+TEST(SceneConfig, MethodNamesRoundTrip) {
+  for (const char* name : {"exact", "volume", "path"})
+    EXPECT_STREQ(render_method_name(*render_method_of(name)), name);
+  EXPECT_FALSE(render_method_of("fast"));
+}
+
+}  // namespace
+}  // namespace heddle

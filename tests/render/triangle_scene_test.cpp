@@ -1,0 +1,44 @@
+#include "render/triangle_scene.h"
+
+#include <gtest/gtest.h>
+
+namespace heddle {
+namespace {
+
+TriangleMesh square(float z) {
+  return {{{-1, -1, z}, {1, -1, z}, {1, 1, z}, {-1, 1, z}}, {{0, 1, 2}, {0, 2, 3}}};
+}
+
+TEST(TriangleScene, FindsTheNearestTriangleFromEitherSide) {
+  const TriangleScene scene({square(1), square(2)});
+  EXPECT_FLOAT_EQ(*scene.intersect({0.3F, 0.1F, 0}, {0, 0, 1}), 1);
+  EXPECT_FLOAT_EQ(*scene.intersect({0.3F, 0.1F, 5}, {0, 0, -1}), 3);
+  EXPECT_FALSE(scene.intersect({0.3F, 0.1F, 0}, {0, 0, -1}));
+  EXPECT_FALSE(scene.intersect({0.3F, 0.1F, 0}, {0, 0, 1}, 0.9F));
+  EXPECT_TRUE(scene.occluded({0.3F, 0.1F, 0}, {0, 0, 1}));
+  EXPECT_FALSE(scene.occluded({0.3F, 0.1F, 0}, {0, 0, 1}, 0.9F));
+  EXPECT_FALSE(scene.occluded({3, 0, 0}, {0, 0, 1}));
+}
+
+TEST(TriangleScene, ListsAllCrossingsInOrder) {
+  const TriangleScene scene({square(3), square(1), square(2)});
+  std::vector<TriangleScene::Crossing> crossings;
+  scene.crossings({0.5F, -0.5F, 0}, {0, 0, 1}, TriangleScene::kInfinity, crossings);
+  ASSERT_EQ(crossings.size(), 3U);
+  EXPECT_EQ(crossings[0].mesh, 1U);
+  EXPECT_EQ(crossings[1].mesh, 2U);
+  EXPECT_EQ(crossings[2].mesh, 0U);
+  EXPECT_EQ(crossings[0].triangle, 0U);
+  EXPECT_FLOAT_EQ(crossings[2].t, 3);
+  scene.crossings({0.5F, -0.5F, 0}, {0, 0, 1}, 2.5F, crossings);
+  EXPECT_EQ(crossings.size(), 2U);
+}
+
+TEST(TriangleScene, EmptySceneBlocksNothing) {
+  const TriangleScene scene({});
+  EXPECT_FALSE(scene.occluded({0, 0, 0}, {0, 0, 1}));
+  EXPECT_FALSE(scene.intersect({0, 0, 0}, {0, 0, 1}));
+}
+
+}  // namespace
+}  // namespace heddle
