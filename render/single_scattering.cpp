@@ -13,9 +13,9 @@ namespace {
 
 constexpr int kMaxLobes = 128;
 
-/// Lobes that carry less than this share of the strongest lobe's light are left out. With 48 lobes, all of
-/// them together carry less than 48e-5 of it.
-constexpr float kNegligible = 1e-5F;
+/// Weak lobes are left out; all of them together carry less than this share of the light. The visibility of
+/// the lobes is itself good to some per cent.
+constexpr float kLeftOut = 3e-3F;
 
 }  // namespace
 
@@ -49,23 +49,24 @@ Rgb SingleScattering::soft(const ShadingPoint& point, const DirectionPair& axis,
   // Each lobe times the light is again a Gaussian: its sharpness n and the light that it carries.
   std::array<float, kMaxLobes> product_sharpness;
   std::array<float, kMaxLobes> carried;
-  float most = 0;
+  float total = 0;
   for (int q = 0; q < lobes; ++q) {
     const float n = (own * lobes_->axes[q] + sharpness * light).norm();
     // n - own - sharpness, without cancellation
     const float exponent = -own * sharpness * (lobes_->axes[q] - light).squaredNorm() / (own + sharpness + n);
     product_sharpness[q] = n;
     carried[q] = float_from_half(weights[q]) * std::exp(exponent);
-    most = std::max(most, carried[q]);
+    total += carried[q];
   }
 
   const BcsdfTable& bcsdf = materials_[point.material];
   const Mat3 to_fiber = frame_about(point.tangent.fabric).transpose();
   const Mat3 lobe_to_fiber = to_fiber * turn;
   const Vec3 wo = to_fiber * point.wo.fabric;
+  const float weak = kLeftOut * total / static_cast<float>(lobes);
   Rgb sum = Rgb::Zero();
   for (int q = 0; q < lobes; ++q) {
-    if (!(carried[q] > kNegligible * most)) continue;
+    if (!(carried[q] > weak)) continue;
     const Vec3 mean = (own * lobes_->axes[q] + sharpness * light) / product_sharpness[q];
     sum += carried[q] * bcsdf.sg_scatter(lobe_to_fiber * mean, product_sharpness[q], wo);
   }

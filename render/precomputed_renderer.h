@@ -1,0 +1,111 @@
+#ifndef HEDDLE_RENDER_PRECOMPUTED_RENDERER_H_
+#define HEDDLE_RENDER_PRECOMPUTED_RENDERER_H_
+// The fast methods: a deferred pass that shades what eye rays see from precomputed data (Khungurn 2017,
+// section 5). Per block of pixels and samples:
+//   1. G-buffer: cloth, segment, cell, frames and fabric position of every sample, by rays against the fibers
+//   or through the
+//      id volume;
+//   2. light visibility: a shadow ray against the shells and the black meshes from the shell's surface
+//   straight above the hit
+//      (below it where the light is under the cloth), for single scattering; another from a point moved along
+//      the cloth by a 2D Gaussian, whose mean is the smoothed visibility of multiple scattering. For a
+//      spherical Gaussian the ray goes in a direction drawn from the light (the mean is a soft shadow); where
+//      the fabric takes light from its face only, from that part of the light that lies on the face's side,
+//      since the precomputed data hold no other light;
+//   3. shading, sorted by cell and tetrahedron: single_scattering.h, multiple_scattering.h. Incoming fields
+//   of all lights are
+//      summed before they are turned and scattered, and are kept while cell and light direction stay the
+//      same.
+// What is not modelled: light between different parts of the cloth, and of the shell's bend between two
+// fibers of one cell. Signs of multiple scattering are kept (see multiple_scattering.h): a dark pixel can be
+// slightly negative. Eye rays are those of the path tracer with the same seed. Random numbers are addressed
+// by pixel of the full frame and sample, and sums run in sample order: the picture depends neither on threads
+// nor on the crop. Tested in tests/render/precomputed_renderer_test.cpp.
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "fibers/baked/fabric_pack.h"
+#include "fibers/baked/id_bricks.h"
+#include "render/camera.h"
+#include "render/cloth_scene.h"
+#include "render/lights.h"
+#include "render/multiple_scattering.h"
+#include "render/path_tracer.h"
+#include "render/render_output.h"
+#include "render/single_scattering.h"
+
+namespace heddle {
+
+struct PrecomputedSettings {
+  std::uint64_t seed = 1;
+  bool volume = false;  // eye rays through the packs' id volumes instead of against fibers
+  std::optional<double>
+      shadow_sigma_mm;  // deviation of the Gaussian; the thickness of the cloth where absent
+};
+
+class PrecomputedRenderer {
+ public:
+  /// packs: [cloth]; the same pack may serve several. Everything passed must outlive the renderer.
+  /// Errors: FileError where a pack lacks what the lights and settings need.
+  PrecomputedRenderer(const ClothScene& scene, std::span<const FabricPack* const> packs,
+                      std::span<const Light> lights, const Rgb& background,
+                      const PrecomputedSettings& settings);
+
+  /// One eye ray's result.
+  struct Sample {
+    Rgb single = Rgb::Zero();
+    Rgb multiple = Rgb::Zero();
+    Rgb background = Rgb::Zero();
+    float alpha = 0;  // 1 where the eye ray meets cloth or a mesh
+  };
+  /// What the first sample of a pixel sees; empty where that is no cloth.
+  struct Seen {
+    std::uint32_t segment;
+    std::uint32_t cell;
+    Vec3d world;
+    Vec3d fabric;
+    Vec3 tangent;
+  };
+
+  /// Samples first .. last - 1 of the pixels of `block`: samples [pixel][sample], pixels row by row. Where
+  /// first is 0, `seen` [pixel] is filled from sample 0.
+  void shade(const Camera& camera, const PixelRect& block, int first, int last, std::vector<Sample>& samples,
+             std::vector<std::optional<Seen>>& seen) const;
+
+ private:
+  struct Cloth {
+    const FabricPack* pack;
+    std::shared_ptr<const IdBricks> bricks;
+    SingleScattering single;
+    MultipleScattering multiple;
+    double shadow_sigma;  // mm
+  };
+  /// Is the light visible past all macroscopic things, at the point and at the point moved along the cloth?
+  struct GlobalVisibility {
+    bool at_point = false;
+    bool nearby = false;
+  };
+
+  std::optional<ShellHit> eye_hit(const SceneRay& ray) const;
+  GlobalVisibility global_visibility(const ShellHit& hit, const Light& light, RandomStream& random) const;
+
+  const ClothScene* scene_;
+  std::span<const Light> lights_;
+  std::vector<MultipleScattering::LightShape> shapes_;  // [light]
+  Rgb background_;
+  PrecomputedSettings settings_;
+  std::vector<Cloth> cloths_;
+};
+
+/// Beauty, single, multiple, alpha, G-buffer of the first sample; with 2 samples or more also half0 (even
+/// samples), half1 (odd samples) and the variance of the pixel's mean.
+FrameBuffers shade_picture(const PrecomputedRenderer& renderer, const Camera& camera, const PixelRect& crop,
+                           int spp, const RenderProgress& progress);
+
+}  // namespace heddle
+
+#endif  // HEDDLE_RENDER_PRECOMPUTED_RENDERER_H_

@@ -1,0 +1,438 @@
+// How far the precomputed methods are from path tracing on a flat, endless cloth: 41 views x 12 directional
+// lights, as in Figure 13 of Khungurn 2017. Not a test: it prints, and writes PREFIX.csv (every value) and
+// PREFIX.svg (curves).
+//
+//   heddle_flat_swatch PACK [--paths N] [--seed S] [--out PREFIX]
+//
+// Views: theta_o = -80, -76, .. 80 degrees in the xz plane. Lights: theta = 10, 30, 50, 70 degrees at
+// azimuths 0, 60, 135 degrees from +x, irradiance 1 across the light's axis. Values: radiance averaged over
+// the tile, rgb. One walk of the reference serves all lights: next-event estimation of each at every vertex.
+// The methods shade the same eye rays:
+//   exact     eye rays against the fibers, single scattering by SSDF sign, multiple scattering by the cells'
+//   transfer volume    the same with eye rays through the id volume midpoint  exact, with the visibility of
+//   single scattering from a shadow ray at the segment's midpoint: what the SSDF encodes floor     exact,
+//   with single scattering of the reference and multiple scattering by the transfer of the hit point itself,
+//   to
+//             the same SH order: what the truncation alone costs. One path per --floor-paths from the hit
+//             point: 4 pi * throughput * K(w0 . light) * sum over j of Y_j(w1) c_S[j], K the reproducing
+//             kernel sum (2 l + 1) / 4 pi P_l.
+//
+// Error: sqrt(mean of (F1 - R1)(F2 - R2)) / mean R, where 1 and 2 are two independent halves of all samples,
+// so that neither the reference's noise nor the methods' own counts. A method shares eye rays with the half
+// of the reference it is compared with, which takes out the noise that they have in common.
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include <CLI/CLI.hpp>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <functional>
+#include <iostream>
+#include <string>
+#include <vector>
+
+#include "fibers/baked/fabric_pack.h"
+#include "fibers/baked/id_bricks.h"
+#include "fibers/math/random.h"
+#include "fibers/math/sampling.h"
+#include "fibers/tracing/path_walk.h"
+#include "fibers/tracing/tile_trace.h"
+#include "formats/input_error.h"
+#include "render/multiple_scattering.h"
+#include "render/single_scattering.h"
+
+namespace heddle {
+namespace {
+
+constexpr int kViews = 41;
+constexpr int kLights = 12;
+constexpr std::array<double, 4> kLightTheta = {10, 30, 50, 70};
+constexpr std::array<double, 3> kLightAzimuth = {0, 60, 135};
+
+double view_degrees(int view) {
+  return -80.0 + 4.0 * view;
+}
+
+Vec3 direction_of(double theta_degrees, double azimuth_degrees) {
+  const double theta = radians(theta_degrees);
+  const double azimuth = radians(azimuth_degrees);
+  return Vec3d(std::sin(theta) * std::cos(azimuth), std::sin(theta) * std::sin(azimuth), std::cos(theta))
+      .cast<float>();
+}
+
+double light_theta(int light) {
+  return kLightTheta[static_cast<std::size_t>(light) / kLightAzimuth.size()];
+}
+double light_azimuth(int light) {
+  return kLightAzimuth[static_cast<std::size_t>(light) % kLightAzimuth.size()];
+}
+
+enum Method { kReference, kExact, kVolume, kMidpoint, kFloor, kMethods };
+constexpr std::array<const char*, kMethods> kMethodNames = {"reference", "exact", "volume", "midpoint",
+                                                            "floor"};
+enum Part { kSingle, kMultiple, kTotal, kParts };
+constexpr std::array<const char*, kParts> kPartNames = {"single", "multiple", "total"};
+
+using Values = std::array<Rgbd, kLights>;                          // [light]
+using MethodValues = std::array<std::array<Values, 2>, kMethods>;  // [method][single, multiple][light]
+using Half = std::vector<MethodValues>;                            // [view]
+
+/// Sum of (2 l + 1) / 4 pi P_l(x) for l <= order: the projection of a delta onto the harmonics.
+double reproducing_kernel(int order, double x) {
+  double previous = 0;
+  double current = 1;
+  double sum = 0;
+  for (int l = 0; l <= order; ++l) {
+    sum += (2 * l + 1) / (4 * kPi) * current;
+    const double next = ((2 * l + 1) * x * current - l * previous) / (l + 1);
+    previous = current;
+    current = next;
+  }
+  return sum;
+}
+
+struct Options {
+  std::string pack;
+  int paths = 4096;
+  int floor_paths = 4;
+  std::uint64_t seed = 1;
+  std::string prefix = "flat_swatch";
+};
+
+class Swatch {
+ public:
+  Swatch(const FabricPack& pack, const Options& options)
+      : pack_(pack),
+        options_(options),
+        scene_(pack.exemplar),
+        trace_(scene_),
+        bricks_(*pack.volume),
+        single_(&*pack.ssdf, nullptr, pack.materials),
+        multiple_(*pack.transfer, pack.materials),
+        strata_(std::max(1, static_cast<int>(std::lround(std::sqrt(options.paths / 2.0))))) {
+    for (int l = 0; l < kLights; ++l) lights_[l] = direction_of(light_theta(l), light_azimuth(l));
+  }
+
+  /// Mean values of one view over half of the eye rays.
+  MethodValues measure(int view, int half) const {
+    MethodValues sum;
+    for (auto& method : sum) {
+      for (auto& part : method) part.fill(Rgbd::Zero());
+    }
+    const Vec3 wo = direction_of(view_degrees(view), 0);
+    const Exemplar& exemplar = pack_.exemplar;
+    const double scale = 1.0 / (strata_ * strata_);
+    for (int i = 0; i < strata_ * strata_; ++i) {
+      RandomStream random(options_.seed, RandomStage::kBench, static_cast<std::uint64_t>(2 * view + half), i);
+      // A point on the plane that touches the cloth from above, one per stratum of the tile.
+      const float x = (static_cast<float>(i % strata_) + random.uniform()) / static_cast<float>(strata_);
+      const float y = (static_cast<float>(i / strata_) + random.uniform()) / static_cast<float>(strata_);
+      const Vec3 origin(x * exemplar.width_mm, y * exemplar.height_mm, exemplar.z_max);
+      if (const auto vertex = trace_.first(origin, -wo)) {
+        add_reference(*vertex, wo, random, scale, sum);
+        add_precomputed(vertex->segment, vertex->tangent, wo, scale, sum[kExact]);
+        add_midpoint_single(*vertex, wo, scale, sum[kMidpoint][kSingle]);
+        for (int k = 0; k < options_.floor_paths; ++k) {
+          add_floor_multiple(*vertex, wo, random, scale / options_.floor_paths, sum[kFloor][kMultiple]);
+        }
+      }
+      if (const auto hit = bricks_.first_hit({origin, -wo})) {
+        add_precomputed(hit->segment, exemplar.segment_tangent(hit->segment), wo, scale, sum[kVolume]);
+      }
+    }
+    sum[kMidpoint][kMultiple] = sum[kExact][kMultiple];
+    sum[kFloor][kSingle] = sum[kReference][kSingle];
+    return sum;
+  }
+
+ private:
+  void add_reference(const TileTrace::Vertex& hit, const Vec3& wo, RandomStream& random, double scale,
+                     MethodValues& sum) const {
+    auto& parts = sum[kReference];
+    walk_path(trace_, std::span<const BcsdfTable>(pack_.materials), hit, wo, Rgb(1, 1, 1), random,
+              WalkLimits{},
+              [&](const TileTrace::Vertex& vertex, const Mat3& frame, const Vec3& out, const Rgb& throughput,
+                  int n) {
+                const Vec3 local_out = frame.transpose() * out;
+                for (int l = 0; l < kLights; ++l) {
+                  if (!trace_.escapes(vertex, lights_[l])) continue;
+                  const Rgb value =
+                      throughput * scattered(vertex.material, frame.transpose() * lights_[l], local_out);
+                  parts[n == 1 ? kSingle : kMultiple][l] += scale * value.cast<double>();
+                }
+                return true;
+              });
+  }
+
+  Rgb scattered(std::uint16_t material, const Vec3& wi, const Vec3& wo) const {
+    return std::sqrt(std::max(0.0F, 1 - wi.x() * wi.x())) * pack_.materials[material].evaluate(wi, wo);
+  }
+
+  void add_precomputed(std::uint32_t segment, const Vec3& tangent, const Vec3& wo, double scale,
+                       std::array<Values, 2>& parts) const {
+    const ShadingPoint point = {segment,
+                                pack_.cell_of_segment[segment],
+                                pack_.exemplar.segment_material(segment),
+                                {tangent, tangent},
+                                {wo, wo}};
+    const MultipleScattering::LightShape shape{std::nullopt};
+    for (int l = 0; l < kLights; ++l) {
+      parts[kSingle][l] += scale * single_.directional(point, {lights_[l], lights_[l]}).cast<double>();
+      IncomingField field;
+      multiple_.incoming(point.cell, shape, lights_[l], field);
+      parts[kMultiple][l] += scale * multiple_.outgoing(field, point.material, tangent, wo).cast<double>();
+    }
+  }
+
+  void add_midpoint_single(const TileTrace::Vertex& hit, const Vec3& wo, double scale, Values& sum) const {
+    const TileTrace::Vertex midpoint = trace_.at_midpoint(hit.segment);
+    const Mat3 frame = frame_about(hit.tangent);
+    for (int l = 0; l < kLights; ++l) {
+      if (!trace_.escapes(midpoint, lights_[l])) continue;
+      sum[l] +=
+          scale *
+          scattered(hit.material, frame.transpose() * lights_[l], frame.transpose() * wo).cast<double>();
+    }
+  }
+
+  void add_floor_multiple(const TileTrace::Vertex& hit, const Vec3& wo, RandomStream& random, double scale,
+                          Values& sum) const {
+    const Vec3 towards = sample_sphere(random);
+    const auto first = trace_.next(hit, towards);
+    if (!first) return;
+    const auto escape = walk_path(
+        trace_, std::span<const BcsdfTable>(pack_.materials), *first, -towards, Rgb(1, 1, 1), random,
+        WalkLimits{}, [](const auto&, const Mat3&, const Vec3&, const Rgb&, int) { return true; });
+    if (!escape || (!pack_.transfer->both_sides && !(escape->direction.z() > 0))) return;
+    const int order = pack_.transfer->order;
+    const Vec3 local = wo_space(hit.tangent, wo) * towards;
+    std::array<float, sh_count(kMaxShOrder)> harmonics;
+    evaluate_sh(order, local, harmonics.data());
+    IncomingField response;
+    pack_.materials[hit.material].sh_coefficients(std::asin(std::clamp(wo.dot(hit.tangent), -1.0F, 1.0F)),
+                                                  order, response.data());
+    Rgbd seen = Rgbd::Zero();
+    for (int j = 0; j < sh_count(order); ++j) {
+      for (int c = 0; c < 3; ++c) seen[c] += static_cast<double>(harmonics[j]) * response[3 * j + c];
+    }
+    const Rgbd carried = 4 * kPi * scale * escape->throughput.cast<double>() * seen;
+    for (int l = 0; l < kLights; ++l) {
+      sum[l] += reproducing_kernel(order, escape->direction.dot(lights_[l])) * carried;
+    }
+  }
+
+  const FabricPack& pack_;
+  const Options& options_;
+  TileScene scene_;
+  TileTrace trace_;
+  IdBricks bricks_;
+  SingleScattering single_;
+  MultipleScattering multiple_;
+  std::array<Vec3, kLights> lights_;
+  int strata_;  // per side of the tile, of each half
+};
+
+double value(const MethodValues& values, int method, int part, int light, int channel) {
+  const auto& parts = values[static_cast<std::size_t>(method)];
+  if (part < kTotal) return parts[static_cast<std::size_t>(part)][light][channel];
+  return parts[kSingle][light][channel] + parts[kMultiple][light][channel];
+}
+
+/// Sum over all pairs (and all channels, where channel < 0) of `term(view, light, channel)`, over their
+/// number.
+template <class Term>
+double mean_over(int channel, Term&& term) {
+  double sum = 0;
+  const int first = channel < 0 ? 0 : channel;
+  const int last = channel < 0 ? 2 : channel;
+  for (int v = 0; v < kViews; ++v) {
+    for (int l = 0; l < kLights; ++l) {
+      for (int c = first; c <= last; ++c) sum += term(v, l, c);
+    }
+  }
+  return sum / (kViews * kLights * (last - first + 1));
+}
+
+struct Comparison {
+  double reference;  // mean
+  double mean;       // of the method
+  double rmse;       // absolute
+};
+
+Comparison compare(const std::array<Half, 2>& halves, int method, int part, int channel) {
+  const auto both = [&](int m, int v, int l, int c) {
+    return 0.5 * (value(halves[0][v], m, part, l, c) + value(halves[1][v], m, part, l, c));
+  };
+  const double squared = mean_over(channel, [&](int v, int l, int c) {
+    double product = 1;
+    for (const Half& half : halves)
+      product *= value(half[v], method, part, l, c) - value(half[v], kReference, part, l, c);
+    return product;
+  });
+  return {mean_over(channel, [&](int v, int l, int c) { return both(kReference, v, l, c); }),
+          mean_over(channel, [&](int v, int l, int c) { return both(method, v, l, c); }),
+          std::sqrt(std::max(0.0, squared))};
+}
+
+void print_report(const FabricPack& pack, const Options& options, const std::array<Half, 2>& halves) {
+  const double noise = std::sqrt(mean_over(-1, [&](int v, int l, int c) {
+    const double d =
+        value(halves[0][v], kReference, kTotal, l, c) - value(halves[1][v], kReference, kTotal, l, c);
+    return 0.25 * d * d;
+  }));
+  const double total = compare(halves, kReference, kTotal, -1).reference;
+  fmt::print("{}: {} segments, SH order {}, {} cells; {} views x {} lights, {} eye rays per view\n",
+             pack.name, pack.exemplar.segment_count(), pack.transfer->order, pack.transfer->grid.count(),
+             kViews, kLights, options.paths);
+  fmt::print("mean reference radiance {:.5f}; its standard error, rms over values: {:.2f} %\n\n", total,
+             100 * noise / total);
+  fmt::print("{:<10}{:<10}{:>12}{:>14}{:>16}{:>26}\n", "method", "part", "mean ratio", "RMSE of part",
+             "RMSE of total", "RMSE of part, r / g / b");
+  for (int m = kExact; m < kMethods; ++m) {
+    for (int p = 0; p < kParts; ++p) {
+      if ((m == kMidpoint && p == kMultiple) || (m == kFloor && p == kSingle)) continue;  // another method's
+      const Comparison all = compare(halves, m, p, -1);
+      fmt::print("{:<10}{:<10}{:>12.4f}{:>12.2f} %{:>14.2f} %    ", kMethodNames[m], kPartNames[p],
+                 all.mean / all.reference, 100 * all.rmse / all.reference, 100 * all.rmse / total);
+      for (int c = 0; c < 3; ++c) {
+        const Comparison one = compare(halves, m, p, c);
+        fmt::print("{:>7.2f}", 100 * one.rmse / one.reference);
+      }
+      fmt::print(" %\n");
+    }
+  }
+}
+
+void write_csv(const std::string& path, const std::array<Half, 2>& halves) {
+  std::ofstream file(path);
+  file << "view_deg,light_theta_deg,light_azimuth_deg,method,part,half,r,g,b\n";
+  for (int v = 0; v < kViews; ++v) {
+    for (int l = 0; l < kLights; ++l) {
+      for (int m = 0; m < kMethods; ++m) {
+        for (int p = 0; p < kTotal; ++p) {
+          for (int h = 0; h < 2; ++h) {
+            file << fmt::format("{},{},{},{},{},{},{:.7g},{:.7g},{:.7g}\n", view_degrees(v), light_theta(l),
+                                light_azimuth(l), kMethodNames[m], kPartNames[p], h,
+                                value(halves[h][v], m, p, l, 0), value(halves[h][v], m, p, l, 1),
+                                value(halves[h][v], m, p, l, 2));
+          }
+        }
+      }
+    }
+  }
+  if (!file.flush()) throw FileError("cannot write " + path);
+}
+
+/// One panel per light: mean of the channels over theta_o, total and single scattering.
+void write_svg(const std::string& path, const std::string& title, const std::array<Half, 2>& halves) {
+  constexpr int kPanelWidth = 320;
+  constexpr int kPanelHeight = 220;
+  constexpr int kMargin = 40;
+  constexpr int kColumns = 3;
+  struct Curve {
+    Method method;
+    const char* colour;
+  };
+  constexpr std::array<Curve, 4> kCurves = {
+      {{kReference, "#000000"}, {kExact, "#d62728"}, {kVolume, "#1f77b4"}, {kFloor, "#2ca02c"}}};
+  const auto grey = [&](int m, int p, int v, int l) {
+    double sum = 0;
+    for (const Half& half : halves) {
+      for (int c = 0; c < 3; ++c) sum += value(half[v], m, p, l, c) / 6;
+    }
+    return sum;
+  };
+  double top = 0;
+  for (int v = 0; v < kViews; ++v) {
+    for (int l = 0; l < kLights; ++l) {
+      for (const Curve& curve : kCurves) top = std::max(top, grey(curve.method, kTotal, v, l));
+    }
+  }
+  std::ofstream file(path);
+  file << fmt::format(
+      "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{}\" height=\"{}\" font-family=\"sans-serif\" "
+      "font-size=\"11\">\n"
+      "<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n"
+      "<text x=\"{}\" y=\"16\" font-size=\"14\">{}: radiance over view angle; solid: total, dashed: single "
+      "scattering</text>\n",
+      kColumns * kPanelWidth + kMargin, kLights / kColumns * kPanelHeight + 3 * kMargin / 2, kMargin, title);
+  double x = kMargin;
+  for (const Curve& curve : kCurves) {
+    file << fmt::format("<text x=\"{}\" y=\"32\" fill=\"{}\">{}</text>\n", x, curve.colour,
+                        kMethodNames[curve.method]);
+    x += 80;
+  }
+  for (int l = 0; l < kLights; ++l) {
+    const double left = kMargin + l % kColumns * kPanelWidth;
+    const double bottom = kMargin + (l / kColumns + 1) * kPanelHeight - 24;
+    const double width = kPanelWidth - kMargin;
+    const double height = kPanelHeight - 44;
+    file << fmt::format(
+        "<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" fill=\"none\" stroke=\"#999999\"/>\n"
+        "<text x=\"{}\" y=\"{}\">light {:.0f} deg, azimuth {:.0f} deg</text>\n"
+        "<text x=\"{}\" y=\"{}\" text-anchor=\"end\">{:.2g}</text><text x=\"{}\" y=\"{}\" "
+        "text-anchor=\"end\">0</text>\n"
+        "<text x=\"{}\" y=\"{}\">-80</text><text x=\"{}\" y=\"{}\" text-anchor=\"end\">80</text>\n",
+        left, bottom - height, width, height, left + 6, bottom - height + 13, light_theta(l),
+        light_azimuth(l), left - 3, bottom - height + 9, top, left - 3, bottom, left, bottom + 12,
+        left + width, bottom + 12);
+    for (const Curve& curve : kCurves) {
+      for (const Part part : {kTotal, kSingle}) {
+        if (part == kSingle && curve.method == kFloor) continue;
+        file << fmt::format("<polyline fill=\"none\" stroke=\"{}\" stroke-width=\"1.3\"{} points=\"",
+                            curve.colour, part == kSingle ? " stroke-dasharray=\"4 3\"" : "");
+        for (int v = 0; v < kViews; ++v) {
+          file << fmt::format("{:.1f},{:.1f} ", left + width * v / (kViews - 1),
+                              bottom - height * grey(curve.method, part, v, l) / top);
+        }
+        file << "\"/>\n";
+      }
+    }
+  }
+  file << "</svg>\n";
+  if (!file.flush()) throw FileError("cannot write " + path);
+}
+
+void run(const Options& options) {
+  const FabricPack pack = load_pack(options.pack);
+  if (!pack.ssdf || !pack.transfer || !pack.volume) {
+    throw FileError(options.pack + ": the pack needs an SSDF, a transfer and a volume");
+  }
+  const Swatch swatch(pack, options);
+  std::array<Half, 2> halves = {Half(kViews), Half(kViews)};
+  tbb::parallel_for(0, 2 * kViews, [&](int i) {
+    halves[static_cast<std::size_t>(i % 2)][i / 2] = swatch.measure(i / 2, i % 2);
+  });
+  print_report(pack, options, halves);
+  write_csv(options.prefix + ".csv", halves);
+  write_svg(options.prefix + ".svg", pack.name, halves);
+}
+
+}  // namespace
+}  // namespace heddle
+
+int main(int argc, char** argv) {
+  heddle::Options options;
+  CLI::App app("Radiance of a flat swatch: precomputed methods against path tracing.");
+  app.add_option("pack", options.pack, "fabric pack with SSDF, transfer and volume")->required();
+  app.add_option("--paths", options.paths, "eye rays per view, both halves together")
+      ->check(CLI::Range(2, 100'000'000));
+  app.add_option("--floor-paths", options.floor_paths, "paths for the floor, per eye ray")
+      ->check(CLI::Range(1, 1000));
+  app.add_option("--seed", options.seed, "seed");
+  app.add_option("--out", options.prefix, "prefix of the .csv and .svg files");
+  CLI11_PARSE(app, argc, argv);
+  try {
+    heddle::run(options);
+  } catch (const heddle::ConfigError& error) {
+    std::cerr << error.what() << '\n';
+    return 2;
+  } catch (const std::exception& error) {
+    std::cerr << error.what() << '\n';
+    return 1;
+  }
+  return 0;
+}

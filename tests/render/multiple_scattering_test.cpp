@@ -1,0 +1,183 @@
+#include "render/multiple_scattering.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <numeric>
+
+#include "fibers/math/quadrature.h"
+#include "fibers/math/random.h"
+#include "fibers/math/sampling.h"
+#include "fibers/math/spherical_gaussian.h"
+
+namespace heddle {
+namespace {
+
+FiberScattering broad_fiber() {
+  FiberScattering fiber;
+  fiber.color_r = Rgbd(0.3, 0.2, 0.1);
+  fiber.color_tt = Rgbd(0.9, 0.7, 0.4);
+  fiber.beta_r = radians(12);
+  fiber.beta_tt = radians(25);
+  fiber.gamma_tt = radians(35);
+  return fiber;
+}
+
+/// One cell whose matrix is `diagonal` times the identity in every colour.
+Transfer diagonal_transfer(int order, const std::array<float, 3>& diagonal, bool both_sides) {
+  Transfer transfer;
+  transfer.order = order;
+  transfer.both_sides = both_sides;
+  const int n = sh_count(order);
+  transfer.matrices.assign(static_cast<std::size_t>(n * n * 3), 0.0F);
+  for (int j = 0; j < n; ++j) {
+    for (int c = 0; c < 3; ++c)
+      transfer.matrices[static_cast<std::size_t>((j * n + j) * 3 + c)] = diagonal[c];
+  }
+  transfer.standard_error.assign(static_cast<std::size_t>(3 * (order + 1)), 0.0F);
+  transfer.paths = {1};
+  return transfer;
+}
+
+/// Integral over the sphere of f(direction) by a product rule in the inclination to and the azimuth about the
+/// frame's x axis, the coordinates in which the BCSDF is smooth.
+template <class Function>
+Rgbd integrate_sphere(const Mat3d& frame, Function&& f) {
+  constexpr int kAzimuths = 96;
+  const QuadratureRule rule = gauss_legendre_panels(16, -kPi / 2, kPi / 2, {-1.5, -1.2, -0.6, 0, 0.6, 1.2, 1.5});
+  Rgbd sum = Rgbd::Zero();
+  for (std::size_t i = 0; i < rule.nodes.size(); ++i) {
+    const double along = std::sin(rule.nodes[i]);
+    const double across = std::cos(rule.nodes[i]);
+    for (int k = 0; k < kAzimuths; ++k) {
+      const double phi = 2 * kPi * (k + 0.5) / kAzimuths;
+      sum += rule.weights[i] * across * 2 * kPi / kAzimuths *
+             f(frame * Vec3d(along, across * std::cos(phi), across * std::sin(phi)));
+    }
+  }
+  return sum;
+}
+
+/// S cos(theta_i) for a fiber with this tangent, all directions in fabric space.
+Rgbd scattered(const FiberScattering& fiber, const Mat3d& frame, const Vec3d& wi, const Vec3d& wo) {
+  const Vec3d in = frame.transpose() * wi;
+  return std::sqrt(std::max(0.0, 1 - in.x() * in.x())) * evaluate_bcsdf(fiber, in, frame.transpose() * wo);
+}
+
+double relative_difference(const Rgb& a, const Rgbd& b) {
+  return ((a.cast<double>() - b) / b.abs().maxCoeff()).abs().maxCoeff();
+}
+
+TEST(WoSpace, IsARotationWithTangentAndViewerInItsPlane) {
+  for (int i = 0; i < 200; ++i) {
+    RandomStream random(1, RandomStage::kTest, 0, static_cast<std::uint64_t>(i));
+    const Vec3 tangent = sample_sphere(random);
+    const Vec3 wo = i == 0 ? tangent : i == 1 ? Vec3(-tangent) : sample_sphere(random);
+    const Mat3 axes = wo_space(tangent, wo);
+    EXPECT_LT((axes * axes.transpose() - Mat3::Identity()).norm(), 1e-5);
+    EXPECT_GT(axes.determinant(), 0);
+    EXPECT_LT((axes * tangent - Vec3::UnitX()).norm(), 1e-5);
+    const Vec3 local = axes * wo;
+    EXPECT_GE(local.y(), -1e-5);
+    EXPECT_NEAR(local.z(), 0, 1e-5);
+  }
+}
+
+TEST(MultipleScatteringLaw, ConstantFieldGivesTheFibersWholeResponse) {
+  // Light 1 from everywhere is sqrt(4 pi) in band 0 alone: the outgoing radiance is the integral of S
+  // cos(theta_i), exactly.
+  const FiberScattering fiber = broad_fiber();
+  const std::vector<BcsdfTable> materials = {BcsdfTable(fiber)};
+  const Transfer transfer = diagonal_transfer(5, {1, 1, 1}, true);
+  const MultipleScattering multiple(transfer, materials);
+  IncomingField field{};
+  for (int c = 0; c < 3; ++c) field[static_cast<std::size_t>(c)] = static_cast<float>(std::sqrt(4 * kPi));
+  for (int i = 0; i < 12; ++i) {
+    RandomStream random(2, RandomStage::kTest, 0, static_cast<std::uint64_t>(i));
+    const Vec3 tangent = sample_sphere(random);
+    const Vec3 wo = sample_sphere(random);
+    const Mat3d frame = frame_about(tangent).cast<double>();
+    const Rgbd expected = integrate_sphere(
+        frame, [&](const Vec3d& wi) { return scattered(fiber, frame, wi, wo.cast<double>()); });
+    // Rows of the table are 180 / 511 degrees apart; linear interpolation of a lobe 12 degrees wide: (0.35 /
+    // 12)^2 / 8 = 1e-4.
+    EXPECT_LT(relative_difference(multiple.outgoing(field, 0, tangent, wo), expected), 1e-3) << i;
+  }
+}
+
+TEST(MultipleScatteringAgreement, RotatedDotProductEqualsQuadratureOfTheTruncatedField) {
+  // An identity matrix hands the light's own expansion on as the incoming field: sum of Y_j(light) Y_j(wi),
+  // in colours.
+  const FiberScattering fiber = broad_fiber();
+  const std::vector<BcsdfTable> materials = {BcsdfTable(fiber)};
+  for (const int order : {0, 2, 5}) {
+    const Transfer transfer = diagonal_transfer(order, {1.0F, 0.5F, 0.25F}, true);
+    const MultipleScattering multiple(transfer, materials);
+    for (int i = 0; i < 6; ++i) {
+      RandomStream random(3, RandomStage::kTest, static_cast<std::uint64_t>(order),
+                          static_cast<std::uint64_t>(i));
+      const Vec3 light = sample_sphere(random);
+      const Vec3 tangent = sample_sphere(random);
+      const Vec3 wo = sample_sphere(random);
+      std::array<double, sh_count(5)> of_light;
+      evaluate_sh(order, light.cast<double>().eval(), of_light.data());
+      const Mat3d frame = frame_about(tangent).cast<double>();
+      const auto quadrature = [&](double sign_floor) {
+        return integrate_sphere(frame, [&](const Vec3d& wi) -> Rgbd {
+          std::array<double, sh_count(5)> of_wi;
+          evaluate_sh(order, wi, of_wi.data());
+          const double kernel =
+              std::inner_product(of_light.begin(), of_light.begin() + sh_count(order), of_wi.begin(), 0.0);
+          return std::max(kernel, sign_floor * std::abs(kernel)) * Rgbd(1, 0.5, 0.25) *
+                 scattered(fiber, frame, wi, wo.cast<double>());
+        });
+      };
+      IncomingField field;
+      multiple.incoming(0, MultipleScattering::LightShape(std::nullopt), light, field);
+      const Rgb got = multiple.outgoing(field, 0, tangent, wo);
+      // Relative to the response to the positive part: ringing may bring the sum close to 0.
+      const double scale = quadrature(0).maxCoeff();
+      EXPECT_LT(((got.cast<double>() - quadrature(-1)) / scale).abs().maxCoeff(), 1e-3) << order << ' ' << i;
+    }
+  }
+}
+
+TEST(MultipleScatteringAgreement, LightShapeIsTheProjectionOfTheNormalisedGaussian) {
+  const std::vector<BcsdfTable> materials;
+  const Transfer transfer = diagonal_transfer(5, {1, 1, 1}, false);
+  const MultipleScattering multiple(transfer, materials);
+  const Vec3 axis = Vec3(0.3F, -0.5F, 0.7F).normalized();
+  for (const float sharpness : {0.0F, 0.5F, 10.0F, 60.0F}) {
+    IncomingField field;
+    multiple.incoming(0, MultipleScattering::LightShape(sharpness), axis, field);
+    for (int j = 0; j < sh_count(5); ++j) {
+      const Rgbd expected = integrate_sphere(Mat3d::Identity(), [&](const Vec3d& w) -> Rgbd {
+        std::array<double, sh_count(5)> y;
+        evaluate_sh(5, w, y.data());
+        return Rgbd::Constant(y[static_cast<std::size_t>(j)] * sg_value({axis.cast<double>(), sharpness}, w) /
+                              sg_mass(static_cast<double>(sharpness)));
+      });
+      EXPECT_NEAR(field[static_cast<std::size_t>(3 * j)], expected[0], 2e-6) << sharpness << ' ' << j;
+    }
+  }
+}
+
+TEST(MultipleScattering, DirectionalLightFromBelowGivesNothingWhereLightComesFromTheFace) {
+  const std::vector<BcsdfTable> materials;
+  const Vec3 below = Vec3(0.2F, 0.1F, -0.3F).normalized();
+  const MultipleScattering::LightShape directional(std::nullopt);
+  IncomingField field;
+  for (const bool both_sides : {false, true}) {
+    const Transfer transfer = diagonal_transfer(3, {1, 1, 1}, both_sides);
+    const MultipleScattering multiple(transfer, materials);
+    multiple.incoming(0, directional, below, field);
+    float largest = 0;
+    for (int k = 0; k < 3 * sh_count(3); ++k)
+      largest = std::max(largest, std::abs(field[static_cast<std::size_t>(k)]));
+    EXPECT_EQ(largest > 0, both_sides);
+  }
+}
+
+}  // namespace
+}  // namespace heddle
