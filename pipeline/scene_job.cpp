@@ -134,7 +134,7 @@ const SceneJob::Loaded& SceneJob::loaded_for(RenderMethod method) {
   }
   std::vector<std::shared_ptr<const TileScene>> tiles;
   for (const ClothConfig& cloth : config_.cloths) tiles.push_back(loaded->tiles.at(cloth.fabric));
-  loaded->scene = std::make_unique<ClothScene>(make_cloth_scene(config_, tiles));
+  loaded->scene.reset(new ClothScene(make_cloth_scene(config_, tiles)));  // cannot be moved: built in place
   return *loaded;
 }
 

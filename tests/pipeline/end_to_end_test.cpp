@@ -52,7 +52,7 @@ bool any_chunk_in(const fs::path& stage_folder) {
   return false;
 }
 
-class EndToEnd : public testing::Test {
+class StagesEndToEnd : public testing::Test {
  protected:
   // One uninterrupted job with two threads, which all tests compare with.
   static void SetUpTestSuite() {
@@ -92,9 +92,9 @@ class EndToEnd : public testing::Test {
 
   static TemporaryFolder* shared_;
 };
-TemporaryFolder* EndToEnd::shared_ = nullptr;
+TemporaryFolder* StagesEndToEnd::shared_ = nullptr;
 
-TEST_F(EndToEnd, OneThreadGivesTheSameBytes) {
+TEST_F(StagesEndToEnd, OneThreadGivesTheSameBytes) {
   const TemporaryFolder other;
   write(other.path());
   const ProgramResult result = run(other.path(), {"precompute", "fabric.toml", "--threads", "1", "-o", "pack"});
@@ -102,7 +102,7 @@ TEST_F(EndToEnd, OneThreadGivesTheSameBytes) {
   EXPECT_EQ(differences(pack(), other.path() / "pack"), std::vector<std::string>{});
 }
 
-TEST_F(EndToEnd, WarmCacheBuildsNothing) {
+TEST_F(StagesEndToEnd, WarmCacheBuildsNothing) {
   const ProgramResult result = run(shared_->path(), {"precompute", "fabric.toml", "--json"});
   ASSERT_EQ(result.status, 0) << result.error;
   const Json report = Json::parse(result.out);
@@ -110,7 +110,7 @@ TEST_F(EndToEnd, WarmCacheBuildsNothing) {
   for (const Json& stage : report.at("stages")) EXPECT_FALSE(stage.at("built").get<bool>()) << stage.dump();
 }
 
-TEST_F(EndToEnd, AnotherDyeKeepsTheVisibility) {
+TEST_F(StagesEndToEnd, AnotherDyeKeepsTheVisibility) {
   std::string fabric = kSmallFabric;
   const std::string color = "[0.2, 0.3, 0.4]";
   std::ofstream(shared_->path() / "bad.toml") << fabric.replace(fabric.find(color), color.size(), "[0.9, 0.1, 0.1]");
@@ -146,19 +146,19 @@ void expect_same_bytes_after_kill(const fs::path& reference, const std::string& 
   EXPECT_FALSE(any_chunk_in(chunks)) << "chunks are removed once the artifact is published";
 }
 
-TEST_F(EndToEnd, KilledVisibilityResumesToTheSameBytes) {
+TEST_F(StagesEndToEnd, KilledVisibilityResumesToTheSameBytes) {
   expect_same_bytes_after_kill(pack(), "maps", [](const fs::path& folder) {
     return in(folder, {"precompute", "fabric.toml", "-o", "pack"});
   });
 }
 
-TEST_F(EndToEnd, KilledTransferResumesToTheSameBytes) {
+TEST_F(StagesEndToEnd, KilledTransferResumesToTheSameBytes) {
   expect_same_bytes_after_kill(pack(), "transfer", [](const fs::path& folder) {
     return in(folder, {"precompute", "fabric.toml", "-o", "pack"});
   });
 }
 
-TEST_F(EndToEnd, ShardsGiveTheSameBytes) {
+TEST_F(StagesEndToEnd, ShardsGiveTheSameBytes) {
   const TemporaryFolder other;
   write(other.path());
   for (const char* stage : {"visibility", "transfer"}) {
@@ -174,7 +174,7 @@ TEST_F(EndToEnd, ShardsGiveTheSameBytes) {
   EXPECT_EQ(differences(pack(), other.path() / "pack"), std::vector<std::string>{});
 }
 
-TEST_F(EndToEnd, SignalsEndWithTheirStatusAndKeepChunks) {
+TEST_F(StagesEndToEnd, SignalsEndWithTheirStatusAndKeepChunks) {
   for (const auto& [signal_number, status] : {std::pair{SIGINT, 130}, std::pair{SIGTERM, 143}}) {
     const TemporaryFolder other;
     write(other.path());
@@ -187,7 +187,7 @@ TEST_F(EndToEnd, SignalsEndWithTheirStatusAndKeepChunks) {
   }
 }
 
-TEST_F(EndToEnd, DamagedPacksAreRefused) {
+TEST_F(StagesEndToEnd, DamagedPacksAreRefused) {
   const TemporaryFolder other;
   const fs::path copy = other.path() / "pack";
   int refused = 0;
@@ -214,7 +214,7 @@ TEST_F(EndToEnd, DamagedPacksAreRefused) {
   EXPECT_GE(refused, 45);
 }
 
-TEST_F(EndToEnd, SoundPackPasses) {
+TEST_F(StagesEndToEnd, SoundPackPasses) {
   const ProgramResult result = run(shared_->path(), {"check", "pack"});
   EXPECT_EQ(result.status, 0) << result.error;
   const ProgramResult info = run(shared_->path(), {"info", "pack", "--json"});
@@ -239,7 +239,7 @@ std::string edited(const char* original, const std::string& from, const std::str
   return text.replace(at, from.size(), to);
 }
 
-TEST_F(EndToEnd, BadInputIsNamed) {
+TEST_F(StagesEndToEnd, BadInputIsNamed) {
   const Arguments synth = {"synth", "bad.toml"};
   const std::vector<BadInput> cases = {
       {"syntax", synth, edited(kSmallFabric, "name = \"small\"", "name = "), 2, "bad.toml:1:"},
