@@ -38,36 +38,14 @@ TransferSettings read_transfer_settings(const TomlTable& section) {
   return settings;
 }
 
-std::vector<float> segment_openness(const TileScene& scene, bool both_sides, std::uint64_t seed) {
-  constexpr int kGrid = 8;
-  const Exemplar& exemplar = scene.exemplar();
-  std::vector<float> openness(exemplar.segment_count());
-  tbb::parallel_for(std::size_t{0}, openness.size(), [&](std::size_t s) {
-    const auto segment = static_cast<std::uint32_t>(s);
-    RandomStream random(seed, RandomStage::kOpenness, s, 0);
-    int open = 0;
-    for (int i = 0; i < kGrid * kGrid; ++i) {
-      const float share = (static_cast<float>(i / kGrid) + random.uniform()) / kGrid;
-      const float phi = 2 * kPif * (static_cast<float>(i % kGrid) + random.uniform()) / kGrid;
-      const float z = both_sides ? 1 - 2 * share : 1 - share;
-      const float r = std::sqrt(std::max(0.0F, 1 - z * z));
-      const Vec3 direction(r * std::cos(phi), r * std::sin(phi), z);
-      if (!scene.occluded({exemplar.segment_midpoint(segment), direction}, exemplar.segment_fiber[segment])) ++open;
-    }
-    openness[s] = static_cast<float>(open) / (kGrid * kGrid) + kLeastOpenness;
-  });
-  return openness;
-}
-
 TransferBaker::TransferBaker(const TileScene& scene, std::span<const BcsdfTable> materials,
-                             const TransferSettings& settings, const CellGrid& grid)
-    : scene_(&scene), materials_(materials), settings_(settings), grid_(grid), cells_(grid.count()) {
-  const std::vector<float> openness = segment_openness(scene, settings.both_sides, settings.seed);
+                             const SegmentOrigins& origins, const TransferSettings& settings, const CellGrid& grid)
+    : scene_(&scene), materials_(materials), origins_(&origins), settings_(settings), grid_(grid), cells_(grid.count()) {
   for (std::uint32_t s = 0; s < scene.exemplar().segment_count(); ++s) {
     CellSegments& cell = cells_[grid_.cell_of(scene.exemplar().segment_midpoint(s))];
     const double before = cell.segment.empty() ? 0.0 : cell.cumulative_openness.back();
     cell.segment.push_back(s);
-    cell.cumulative_openness.push_back(before + openness[s]);
+    cell.cumulative_openness.push_back(before + origins.openness[s] + kLeastOpenness);
   }
 }
 
@@ -100,7 +78,7 @@ void TransferBaker::bake_cell(std::uint32_t cell, float* matrix, float* standard
       const float r = std::sqrt(std::max(0.0F, 1 - z * z));
       const Vec3 w1(r * std::cos(phi), r * std::sin(phi), z);
 
-      const auto first = trace.next(trace.at_midpoint(segment), w1);
+      const auto first = trace.next(trace.at(origins_->position[segment], segment), w1);
       if (!first) continue;
       const auto escape = walk_path(trace, materials_, *first, -w1, Rgb::Ones(), random, limits,
                                     [](const auto&, const Mat3&, const Vec3&, const Rgb&, int) { return true; });

@@ -2,7 +2,7 @@
 #define HEDDLE_PRECOMPUTE_TRANSFER_BAKE_H_
 // Estimates the indirect light transfer (IIRTF) of every cell by light paths on the endless flat cloth.
 //
-// A path leaves a segment's midpoint towards a uniform direction w1; if it hits a fiber it scatters by BCSDF sampling until
+// A path leaves a segment's origin (fibers/tracing/segment_origins.h) towards a uniform direction w1; if it hits a fiber it scatters by BCSDF sampling until
 // it leaves the cloth in direction w0, and adds 4 pi * throughput * Y_j0(w0) * Y_j1(w1) to a[j0][j1] of the segment's cell.
 // Light from the face only: paths that leave with w0.z <= 0 are dropped. One path so serves every light direction, where
 // the estimator of Khungurn 2017, section 4.2 (w0 and w1 both uniform) serves one and pays for narrow lobes with noise;
@@ -20,6 +20,7 @@
 
 #include "fibers/baked/transfer.h"
 #include "fibers/scattering/bcsdf_table.h"
+#include "fibers/tracing/segment_origins.h"
 #include "fibers/tracing/tile_scene.h"
 #include "formats/toml_table.h"
 
@@ -38,10 +39,8 @@ struct TransferSettings {
 /// Reads the section [transfer]; both_sides and seed are the fabric's.
 TransferSettings read_transfer_settings(const TomlTable& section);
 
-/// Share of the sky that each segment sees from its midpoint (own fiber ignored): of the face's hemisphere, or of the whole
-/// sphere; from 64 stratified rays, plus kLeastOpenness so that hidden segments are only rarely, not never, chosen.
+/// Added to each segment's openness, so that hidden segments are only rarely, not never, chosen.
 inline constexpr float kLeastOpenness = 1e-3F;
-std::vector<float> segment_openness(const TileScene& scene, bool both_sides, std::uint64_t seed);
 
 struct TransferChunk {
   std::uint32_t first_cell = 0;
@@ -54,9 +53,9 @@ class TransferBaker {
  public:
   static constexpr int kBatch = 1024;  // paths per batch
 
-  /// The scene and the tables must outlive the baker.
-  TransferBaker(const TileScene& scene, std::span<const BcsdfTable> materials, const TransferSettings& settings,
-                const CellGrid& grid);
+  /// The scene, the tables and the origins must outlive the baker.
+  TransferBaker(const TileScene& scene, std::span<const BcsdfTable> materials, const SegmentOrigins& origins,
+                const TransferSettings& settings, const CellGrid& grid);
 
   /// Cells first .. last - 1, in parallel.
   TransferChunk bake(std::uint32_t first_cell, std::uint32_t last_cell) const;
@@ -70,6 +69,7 @@ class TransferBaker {
 
   const TileScene* scene_;
   std::span<const BcsdfTable> materials_;
+  const SegmentOrigins* origins_;
   TransferSettings settings_;
   CellGrid grid_;
   struct CellSegments {

@@ -31,21 +31,18 @@ class TileTrace {
   bool escapes(const Vertex& from, const Vec3& direction) const {
     return !scene_->occluded({from.position, direction}, from.fiber);
   }
-  /// The vertex at a segment's midpoint.
-  Vertex at_midpoint(std::uint32_t segment) const {
-    return vertex(scene_->exemplar().segment_midpoint(segment), segment);
-  }
-
- private:
-  Vertex vertex(const Vec3& position, std::uint32_t segment) const {
+  /// A vertex on a given segment.
+  Vertex at(const Vec3& position, std::uint32_t segment) const {
     const Exemplar& exemplar = scene_->exemplar();
     const std::uint32_t fiber = exemplar.segment_fiber[segment];
     return {position, exemplar.segment_tangent(segment), segment, fiber, exemplar.material[fiber]};
   }
+
+ private:
   std::optional<Vertex> query(const Vec3& origin, const Vec3& direction, std::uint32_t own_fiber) const {
     const std::optional<FiberHit> hit = scene_->intersect({origin, direction}, own_fiber);
     if (!hit) return {};
-    return vertex(origin + hit->t * direction, hit->segment);
+    return at(origin + hit->t * direction, hit->segment);
   }
   const TileScene* scene_;
 };

@@ -86,7 +86,7 @@ void compare_estimators(const std::string& path) {
         const std::uint32_t segment = segments[random.index(segments.size())];
         const Vec3 w0 = sample_hemisphere(Vec3(0, 0, 1), random);
         const Vec3 w1 = sample_sphere(random);
-        const auto first = trace.next(trace.at_midpoint(segment), w1);
+        const auto first = trace.next(trace.at(exemplar.segment_midpoint(segment), segment), w1);
         if (!first) continue;
         Rgb radiance = Rgb::Zero();
         walk_path(trace, materials, *first, -w1, Rgb::Ones(), random, WalkLimits{},
@@ -108,7 +108,7 @@ void compare_estimators(const std::string& path) {
         RandomStream random(1, RandomStage::kBench, 200 + cell, static_cast<std::uint64_t>(batch * kPathsPerBatch + i));
         const std::uint32_t segment = segments[random.index(segments.size())];
         const Vec3 w1 = sample_sphere(random);
-        const auto first = trace.next(trace.at_midpoint(segment), w1);
+        const auto first = trace.next(trace.at(exemplar.segment_midpoint(segment), segment), w1);
         if (!first) continue;
         const auto escape = walk_path(trace, materials, *first, -w1, Rgb::Ones(), random, WalkLimits{},
                                       [](auto&&...) { return true; });

@@ -30,12 +30,12 @@ TEST(TransferBakeStatistical, FurnaceBalancesVisibility) {
   exemplar.scattering = {test::white_fiber()};
   const TileScene scene(exemplar);
   const std::vector<BcsdfTable> materials = {BcsdfTable(test::white_fiber())};
+  const SegmentOrigins origins = find_segment_origins(scene, true, OriginChoice::kExposed, 1);
   const CellGrid grid = make_cell_grid(exemplar.width_mm, exemplar.height_mm, exemplar.z_min, exemplar.z_max, 0.2F);
   const TransferSettings settings = settings_of(2, 16384, true);
-  const TransferBaker baker(scene, materials, settings, grid);
+  const TransferBaker baker(scene, materials, origins, settings, grid);
   const std::vector<TransferChunk> chunks = {baker.bake(0, grid.count())};
   const Transfer transfer = baker.assemble(chunks);
-  const std::vector<float> openness = segment_openness(scene, true, settings.seed);
   double worst = 0;
   int compared = 0;
   for (std::uint32_t cell = 0; cell < grid.count(); ++cell) {
@@ -45,7 +45,7 @@ TEST(TransferBakeStatistical, FurnaceBalancesVisibility) {
     for (std::uint32_t s = 0; s < exemplar.segment_count(); ++s) {
       if (grid.cell_of(exemplar.segment_midpoint(s)) != cell) continue;
       segments.push_back(s);
-      most_open = std::max(most_open, openness[s]);
+      most_open = std::max(most_open, origins.openness[s] + kLeastOpenness);
     }
     const int samples = 16384;
     double open[9] = {};
@@ -53,9 +53,9 @@ TEST(TransferBakeStatistical, FurnaceBalancesVisibility) {
     for (int i = 0; i < samples; ++i) {
       RandomStream random(1, RandomStage::kTest, 30 + cell, static_cast<std::uint64_t>(i));
       std::uint32_t s = segments[random.index(segments.size())];
-      while (random.uniform() * most_open > openness[s]) s = segments[random.index(segments.size())];
+      while (random.uniform() * most_open > origins.openness[s] + kLeastOpenness) s = segments[random.index(segments.size())];
       const Vec3 w = sample_sphere(random);
-      if (scene.occluded({exemplar.segment_midpoint(s), w}, exemplar.segment_fiber[s])) continue;
+      if (scene.occluded({origins.position[s], w}, exemplar.segment_fiber[s])) continue;
       float y[9];
       evaluate_sh(2, w, y);
       for (int j = 0; j < 9; ++j) {
@@ -85,9 +85,10 @@ TEST(TransferBakeLaw, FaceLightIsPartOfLightFromBothSides) {
   Exemplar exemplar = synthesize(test::small_fabric());
   const TileScene scene(exemplar);
   const std::vector<BcsdfTable> materials = {BcsdfTable(exemplar.scattering[0])};
+  const SegmentOrigins origins = find_segment_origins(scene, false, OriginChoice::kExposed, 1);
   const CellGrid grid = make_cell_grid(exemplar.width_mm, exemplar.height_mm, exemplar.z_min, exemplar.z_max, 0.3F);
-  const TransferBaker face(scene, materials, settings_of(0, 8192, false), grid);
-  const TransferBaker both(scene, materials, settings_of(0, 8192, true), grid);
+  const TransferBaker face(scene, materials, origins, settings_of(0, 8192, false), grid);
+  const TransferBaker both(scene, materials, origins, settings_of(0, 8192, true), grid);
   const TransferChunk a = face.bake(0, grid.count());
   const TransferChunk b = both.bake(0, grid.count());
   for (std::size_t i = 0; i < a.matrices.size(); ++i) {
@@ -100,8 +101,9 @@ TEST(TransferBakeLaw, AnyCutAndAnyThreadCountGiveTheSameBits) {
   Exemplar exemplar = synthesize(test::small_fabric());
   const TileScene scene(exemplar);
   const std::vector<BcsdfTable> materials = {BcsdfTable(exemplar.scattering[0])};
+  const SegmentOrigins origins = find_segment_origins(scene, false, OriginChoice::kExposed, 1);
   const CellGrid grid = make_cell_grid(exemplar.width_mm, exemplar.height_mm, exemplar.z_min, exemplar.z_max, 0.3F);
-  const TransferBaker baker(scene, materials, settings_of(1, 4096, false), grid);
+  const TransferBaker baker(scene, materials, origins, settings_of(1, 4096, false), grid);
   const TransferChunk whole = baker.bake(0, grid.count());
   const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
   std::vector<TransferChunk> chunks;
@@ -114,6 +116,7 @@ TEST(TransferBakeStatistical, StoredErrorIsTheSpreadOverSeeds) {
   Exemplar exemplar = synthesize(test::small_fabric());
   const TileScene scene(exemplar);
   const std::vector<BcsdfTable> materials = {BcsdfTable(exemplar.scattering[0])};
+  const SegmentOrigins origins = find_segment_origins(scene, false, OriginChoice::kExposed, 1);
   const CellGrid grid = make_cell_grid(exemplar.width_mm, exemplar.height_mm, exemplar.z_min, exemplar.z_max, 0.3F);
   std::uint32_t cell = 0;
   const int seeds = 24;
@@ -123,7 +126,7 @@ TEST(TransferBakeStatistical, StoredErrorIsTheSpreadOverSeeds) {
   for (int seed = 1; seed <= seeds; ++seed) {
     TransferSettings settings = settings_of(0, 16384, false);
     settings.seed = static_cast<std::uint64_t>(seed);
-    const TransferBaker baker(scene, materials, settings, grid);
+    const TransferBaker baker(scene, materials, origins, settings, grid);
     TransferChunk chunk = baker.bake(cell, cell + 1);
     while (chunk.paths[0] == 0) {
       ++cell;

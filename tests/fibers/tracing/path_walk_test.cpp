@@ -157,7 +157,7 @@ TEST(PathWalk, EndsWhereTheVisitorSaysSo) {
   const TileTrace trace(scene);
   const std::vector<BcsdfTable> materials = {BcsdfTable(test::white_fiber())};
   RandomStream random(1, RandomStage::kTest, 13, 0);
-  const TileTrace::Vertex start = trace.at_midpoint(5);
+  const TileTrace::Vertex start = trace.at(scene.exemplar().segment_midpoint(5), 5);
   int visits = 0;
   EXPECT_FALSE(walk_path(trace, materials, start, Vec3(0, 0, 1), Rgb::Ones(), random, WalkLimits{}, [&](auto&&...) {
     ++visits;
