@@ -102,7 +102,8 @@ Report describe_tensors(const fs::path& path, const CommonOptions& common) {
 /// Bytes of a pack's tensor file, less those of the tensors that all segments share.
 std::uint64_t bytes_without_basis(const fs::path& path) {
   std::uint64_t bytes = fs::file_size(path);
-  for (const auto& [name, entry] : TensorFile::read(path).entries()) {
+  const TensorFile file = TensorFile::read(path);
+  for (const auto& [name, entry] : file.entries()) {
     if (name == "mean" || name == "basis" || name == "axes") bytes -= entry.size;
   }
   return bytes;

@@ -130,7 +130,7 @@ std::map<std::string, std::function<int()>> add_commands(CLI::App& app, Options&
 
   CLI::App* evaluate = app.add_subcommand("eval", "JSON lines in, JSON lines out: any scattering model or basis function");
   evaluate->footer("Quantities and their fields: docs/eval.md");
-  actions["eval"] = [] { return evaluate_lines(std::cin, std::cout); };
+  actions["eval"] = [] { return run_eval(std::cin, std::cout); };
 
   CLI::App* compare = app.add_subcommand("compare", "Error metrics of picture A against the reference B");
   CompareOptions& pair = options.compare;

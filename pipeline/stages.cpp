@@ -153,6 +153,14 @@ const TileScene& FabricStages::scene() {
   return *scene_;
 }
 
+const SegmentOrigins& FabricStages::origins() {
+  if (!origins_) {
+    origins_ = find_segment_origins(scene(), document_.config.light_from_both_sides, OriginChoice::kExposed,
+                                    document_.config.seed);
+  }
+  return *origins_;
+}
+
 const std::string& FabricStages::geometry_key() {
   if (geometry_key_.empty()) geometry_key_ = hash_of_geometry(exemplar());
   return geometry_key_;
@@ -231,12 +239,15 @@ void FabricStages::run_shard(const Stage& stage, Work&& work) {
 
 // Maps do not depend on [visibility], which says how they are compressed.
 FabricStages::Stage FabricStages::maps_stage() {
-  return make_stage("maps", 1, ".safetensors", "", {{"geometry", geometry_key()}, {"light_from", light_from()}});
+  return make_stage("maps", 1, ".safetensors", "",
+                    {{"geometry", geometry_key()},
+                     {"light_from", light_from()},
+                     {"seed", fmt::format("{}", document_.config.seed)}});
 }
 
 /// Computes one chunk of maps.
 void FabricStages::compute_maps(const Stage& stage, const fs::path& file, std::uint32_t first, std::uint32_t end) {
-  write_visibility_maps(file, bake_visibility_maps(scene(), document_.config.light_from_both_sides, first, end),
+  write_visibility_maps(file, bake_visibility_maps(scene(), origins(), document_.config.light_from_both_sides, first, end),
                         stage.metadata);
 }
 
@@ -255,8 +266,7 @@ Artifact FabricStages::maps() {
       if (chunk.first_segment != first || chunk.count() != end - first || chunk.both_sides != all.both_sides) {
         throw FileError(file.string() + ": not the chunk that its name says");
       }
-      all.words.insert(all.words.end(), chunk.words.begin(), chunk.words.end());
-      all.sees_nothing.insert(all.sees_nothing.end(), chunk.sees_nothing.begin(), chunk.sees_nothing.end());
+      all.append(chunk);
     });
     write_visibility_maps(path, all, stage.metadata);
     PartialChunks(context_->cache, stage.name, stage.key).remove();
@@ -325,7 +335,7 @@ std::unique_ptr<FabricStages::TransferWork> FabricStages::transfer_work(const Tr
   const Exemplar& cloth = exemplar();
   const CellGrid grid = make_cell_grid(cloth.width_mm, cloth.height_mm, cloth.z_min, cloth.z_max,
                                        static_cast<float>(settings.cell_mean_free_paths * mean_free_path));
-  work->baker.emplace(scene(), work->materials, settings, grid);
+  work->baker.emplace(scene(), work->materials, origins(), settings, grid);
   return work;
 }
 

@@ -5,7 +5,7 @@
 // does not ask for (directly or through what it asks for).
 //
 //   synth       config without the sections below           fibers.safetensors       Exemplar
-//   maps        geometry, light_from         in chunks      maps.safetensors         VisibilityMaps
+//   maps        geometry, light_from, seed  in chunks       maps.safetensors         VisibilityMaps
 //   ssdf        maps, [visibility]                          ssdf.safetensors         SsdfVisibility
 //   sg          maps, [visibility]                          sg.safetensors           SgVisibility
 //   transfer    fibers, [transfer], light_from   in chunks  transfer.safetensors     Transfer
@@ -26,6 +26,7 @@
 
 #include "fibers/cloth/exemplar.h"
 #include "fibers/cloth/fabric_config.h"
+#include "fibers/tracing/segment_origins.h"
 #include "fibers/tracing/tile_scene.h"
 #include "pipeline/cache.h"
 #include "pipeline/console.h"
@@ -136,6 +137,7 @@ class FabricStages {
 
   const Exemplar& exemplar();
   const TileScene& scene();
+  const SegmentOrigins& origins();
   const std::string& geometry_key();
   const char* light_from() const;
   Stage maps_stage();
@@ -150,6 +152,7 @@ class FabricStages {
   StageContext* context_;
   std::optional<Exemplar> exemplar_;
   std::unique_ptr<TileScene> scene_;
+  std::optional<SegmentOrigins> origins_;
   std::string geometry_key_;
 };
 

@@ -67,6 +67,11 @@ fov_deg = 25
 fov_axis = "vertical"
 resolution_px = [24, 24]
 
+[camera.reference]
+corner_px = [8, 8]
+size_px = [8, 6]
+spp = 4
+
 [[light]]
 type = "directional"
 direction = [0.3, 0.2, 1]
