@@ -43,10 +43,8 @@ class BcsdfTable {
   /// Gamma of sg_scatter.h by SgMethod::kDefault, for a unit axis and sharpness >= 0.
   Rgb sg_scatter(const Vec3& axis, float sharpness, const Vec3& wo) const;
 
-  /// bcsdf_sh by linear interpolation between rows. out: [(order + 1)^2][3], order <= kMaxOrder. Error 5e-5;
-  /// where an end of
-  /// [-pi/2, pi/2] cuts a lobe narrower than 2 degrees, 2e-3 at beta = 1 degree, up to .1 at .1 degrees in
-  /// the last 2 degrees.
+  /// bcsdf_sh by linear interpolation between rows. out: [(order + 1)^2][3], order <= kMaxOrder. Error 1e-4,
+  /// but where an end of [-pi/2, pi/2] cuts a narrow lobe: 2e-3 at beta = 1 degree, 0.1 at 0.1 degrees.
   void sh_coefficients(float theta_o, int order, float* out) const;
 
  private:

@@ -1,0 +1,28 @@
+#ifndef HEDDLE_PIPELINE_EVAL_EVAL_QUANTITIES_H_
+#define HEDDLE_PIPELINE_EVAL_EVAL_QUANTITIES_H_
+// The quantities that `heddle eval` knows: each reads its fields from the request and returns its value. A
+// new one is declared here, defined in the file of its family and listed in the table of eval.cpp and in
+// docs/eval.md.
+
+#include <nlohmann/json.hpp>
+
+#include "pipeline/eval/eval_request.h"
+
+namespace heddle {
+
+// eval_scattering.cpp
+nlohmann::json eval_bcsdf(EvalObject& request);
+nlohmann::json eval_bcsdf_albedo(EvalObject& request);
+nlohmann::json eval_bcsdf_sh(EvalObject& request);
+nlohmann::json eval_sg_scatter(EvalObject& request);
+
+// eval_basis.cpp
+nlohmann::json eval_sg_mass(EvalObject& request);
+nlohmann::json eval_sg_product(EvalObject& request);
+nlohmann::json eval_sg_zonal(EvalObject& request);
+nlohmann::json eval_sh(EvalObject& request);
+nlohmann::json eval_sh_rotate(EvalObject& request);
+
+}  // namespace heddle
+
+#endif  // HEDDLE_PIPELINE_EVAL_EVAL_QUANTITIES_H_

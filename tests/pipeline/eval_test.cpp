@@ -1,0 +1,280 @@
+#include "pipeline/eval/eval.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "fibers/math/spherical_harmonics.h"
+#include "fibers/scattering/sg_scatter.h"
+
+namespace heddle {
+namespace {
+
+using Json = nlohmann::json;
+
+struct Outcome {
+  int status;
+  std::vector<std::string> lines;
+};
+
+Outcome run(const std::string& input) {
+  std::istringstream in(input);
+  std::ostringstream out;
+  Outcome result;
+  result.status = run_eval(in, out);
+  std::istringstream lines(out.str());
+  for (std::string line; std::getline(lines, line);) result.lines.push_back(line);
+  return result;
+}
+
+Json answer(const std::string& line) {
+  const Outcome result = run(line + "\n");
+  EXPECT_EQ(result.lines.size(), 1U) << line;
+  return Json::parse(result.lines.at(0));
+}
+
+Json value_of(const std::string& line) {
+  const Json json = answer(line);
+  EXPECT_TRUE(json.contains("value")) << line << "\n" << json;
+  return json.value("value", Json());
+}
+
+// The error of a bad line, which must have status 1 and no value.
+std::string error_of(const std::string& line) {
+  EXPECT_EQ(run(line).status, 1) << line;
+  const Json json = answer(line);
+  EXPECT_FALSE(json.contains("value")) << line;
+  return json.value("error", std::string());
+}
+
+const std::string kFiber =
+    R"("fiber":{"color_r":[0.745,0.008,0.07],"color_tt":[0.62,0.553,0.562],"beta_r_deg":1,"beta_tt_deg":10,"gamma_tt_deg":19.823})";
+
+FiberScattering fiber() {
+  return {{0.745, 0.008, 0.07}, {0.62, 0.553, 0.562}, radians(1), radians(10), radians(19.823)};
+}
+
+void expect_color(const Json& json, const Rgbd& color) {
+  ASSERT_EQ(json.size(), 3U);
+  for (int c = 0; c < 3; ++c) EXPECT_EQ(json[static_cast<std::size_t>(c)].get<double>(), color[c]);
+}
+
+TEST(EvalFormat, AnswersKeepTheOrderAndBlankLinesAreSkipped) {
+  const Outcome result =
+      run("\n  \t\n{\"quantity\":\"sg_mass\",\"sharpness\":0,\"id\":1}\r\n\n{\"id\":2}\n"
+          "{\"id\":3,\"quantity\":\"sg_mass\",\"sharpness\":1}");
+  EXPECT_EQ(result.status, 1);
+  ASSERT_EQ(result.lines.size(), 3U);
+  EXPECT_EQ(result.lines[0], "{\"id\":1,\"value\":12.566370614359172}");
+  EXPECT_EQ(result.lines[1], "{\"id\":2,\"error\":\"missing field \\\"quantity\\\"\"}");
+  EXPECT_EQ(result.lines[2].substr(0, 15), "{\"id\":3,\"value\"");
+  EXPECT_EQ(run("{\"quantity\":\"sg_mass\",\"sharpness\":0}\n").status, 0);
+  EXPECT_EQ(run("").status, 0);
+}
+
+TEST(EvalFormat, TheIdIsEchoedAsItWasWritten) {
+  for (const std::string id : {"1", "1.0", "1e2", "-0", "123456789012345678901234567890", "\"a\\u00e9\\/b\"",
+                               "null", "true", "[1, {\"b\":2, \"a\": \"},]\"}]", "{ \"x\" : [ ] }"}) {
+    EXPECT_EQ(run("{\"quantity\":\"sg_mass\", \"id\" : " + id + " ,\"sharpness\":0}").lines.at(0),
+              "{\"id\":" + id + ",\"value\":12.566370614359172}");
+    EXPECT_EQ(run("{\"quantity\":\"sg_mass\",\"id\":" + id + "}").lines.at(0),
+              "{\"id\":" + id + ",\"error\":\"missing field \\\"sharpness\\\"\"}");
+  }
+  EXPECT_EQ(run("{\"quantity\":\"sg_mass\",\"sharpness\":0}").lines.at(0), "{\"value\":12.566370614359172}");
+}
+
+TEST(EvalFormat, AnUnreadableLineHasIdNullAndDoesNotStopTheStream) {
+  for (const std::string line : {"x",
+                                 "{",
+                                 "}",
+                                 "[]",
+                                 "3",
+                                 "\"quantity\"",
+                                 "{\"id\":1",
+                                 "{\"id\":1,}",
+                                 "{\"id\":1} {}",
+                                 "{\"id\" 1}",
+                                 "{\"id\":}",
+                                 "{\"id\":1,\"quantity\":\"sg_mass\",\"sharpness\":NaN}",
+                                 "{\"id\":1,\"a\":1 2}",
+                                 "{\"id\":1,\"a\":[1}",
+                                 "{\"id\":1,a:2}",
+                                 "{\"id\":\"\xff\"}",
+                                 "{\"id\":1,\"a\xff\":2}",
+                                 "{\"id\":1,\"a\":\"unfinished}",
+                                 "{,}",
+                                 "{\"id\":1]}"}) {
+    const Outcome result = run(line + "\n{\"quantity\":\"sg_mass\",\"sharpness\":0}\n");
+    ASSERT_EQ(result.lines.size(), 2U) << line;
+    const Json json = Json::parse(result.lines[0]);
+    EXPECT_TRUE(json.contains("id") && json["id"].is_null()) << line;
+    EXPECT_FALSE(json.value("error", std::string()).empty()) << line;
+    EXPECT_EQ(result.lines[1], "{\"value\":12.566370614359172}");
+    EXPECT_EQ(result.status, 1);
+  }
+}
+
+TEST(EvalFormat, EveryTruncationOfALineIsAnAnsweredError) {
+  const std::string line =
+      "{\"id\":[7],\"quantity\":\"bcsdf\"," + kFiber + R"(,"wi":[0,1,0],"wo":[0,-1,0],"lobe":"tt"})";
+  EXPECT_EQ(run(line).status, 0);
+  for (std::size_t length = 1; length < line.size(); ++length) {
+    const Json json = answer(line.substr(0, length));
+    EXPECT_TRUE(json.contains("error") && json["id"].is_null()) << length;
+  }
+}
+
+// A stream that counts how often it is flushed.
+class CountingBuffer : public std::stringbuf {
+ public:
+  int flushes = 0;
+
+ protected:
+  int sync() override {
+    ++flushes;
+    return 0;
+  }
+};
+
+TEST(EvalFormat, EveryAnswerIsFlushed) {
+  CountingBuffer buffer;
+  std::ostream out(&buffer);
+  std::istringstream in("{}\n{}\n\n{}\n");
+  run_eval(in, out);
+  EXPECT_EQ(buffer.flushes, 3);
+}
+
+TEST(EvalFormat, ErrorsNameTheField) {
+  const auto names = [](const std::string& line, const std::string& text) {
+    const std::string error = error_of(line);
+    EXPECT_NE(error.find(text), std::string::npos) << line << "\n" << error;
+  };
+  names(R"({"quantity":"nothing"})", "bcsdf, bcsdf_albedo");
+  names(R"({"quantity":3})", "\"quantity\"");
+  names(R"({"quantity":"sg_mass"})", "missing field \"sharpness\"");
+  names(R"({"quantity":"sg_mass","sharpness":1,"extra":2})", "unknown field \"extra\"");
+  names(R"({"quantity":"sg_mass","sharpness":1,"sharpness":1})", "duplicate field \"sharpness\"");
+  names(R"({"quantity":"sg_mass","sharpness":"1"})", "\"sharpness\"");
+  names(R"({"quantity":"sg_mass","sharpness":-1e-9})", "\"sharpness\"");
+  names(R"({"quantity":"sg_mass","sharpness":1e999})", "\"sharpness\"");
+  names(R"({"quantity":"sh","order":11,"direction":[0,0,1]})", "\"order\"");
+  names(R"({"quantity":"sh","order":-1,"direction":[0,0,1]})", "\"order\"");
+  names(R"({"quantity":"sh","order":1.5,"direction":[0,0,1]})", "\"order\"");
+  names(R"({"quantity":"sh","order":1,"direction":[0,0,1.002]})", "\"direction\"");
+  names(R"({"quantity":"sh","order":1,"direction":[0,0]})", "\"direction\"");
+  names(R"({"quantity":"sh","order":1,"direction":[0,0,"1"]})", "\"direction\"");
+  names(R"({"quantity":"sh_rotate","order":0,"rotation":[1,0,0,0,1,0,0,0,1.01],"coefficients":[1]})",
+        "\"rotation\"");
+  names(R"({"quantity":"sh_rotate","order":0,"rotation":[1,0,0,0,1,0,0,0,-1],"coefficients":[1]})",
+        "\"rotation\"");
+  names(R"({"quantity":"sh_rotate","order":1,"rotation":[1,0,0,0,1,0,0,0,1],"coefficients":[1]})",
+        "\"coefficients\"");
+  names("{\"quantity\":\"bcsdf_albedo\"," + kFiber + ",\"theta_i_deg\":90.1}", "\"theta_i_deg\"");
+  names("{\"quantity\":\"bcsdf\"," + kFiber + R"(,"wi":[0,1,0],"wo":[0,1,0],"lobe":"trt"})", "\"lobe\"");
+  names("{\"quantity\":\"sg_scatter\"," + kFiber +
+            R"(,"axis":[0,1,0],"sharpness":1,"wo":[0,1,0],"method":"fast"})",
+        "\"method\"");
+  names("{\"quantity\":\"sg_scatter\"," + kFiber + R"(,"axis":[0,1,0],"sharpness":1,"wo":[0,1,0]})",
+        "missing field \"method\"");
+  const auto with_fiber = [](const std::string& fields) {
+    return "{\"quantity\":\"bcsdf_albedo\",\"theta_i_deg\":0,\"fiber\":{" + fields + "}}";
+  };
+  const std::string colors = R"("color_r":[0,0,0],"color_tt":[1,1,1],)";
+  names(with_fiber(colors + R"("beta_r_deg":1,"beta_tt_deg":1)"), "missing field \"fiber.gamma_tt_deg\"");
+  names(with_fiber(colors + R"("beta_r_deg":0,"beta_tt_deg":1,"gamma_tt_deg":1)"), "\"fiber.beta_r_deg\"");
+  names(with_fiber(colors + R"("beta_r_deg":1,"beta_tt_deg":1,"gamma_tt_deg":1,"x":0)"),
+        "unknown field \"fiber.x\"");
+  names(with_fiber(colors + R"("beta_r_deg":1,"beta_tt_deg":1,"gamma_tt_deg":1,"beta_r_deg":1)"),
+        "\"fiber.beta_r_deg\"");
+  names(
+      with_fiber(R"("color_r":[0,0,1.5],"color_tt":[1,1,1],"beta_r_deg":1,"beta_tt_deg":1,"gamma_tt_deg":1)"),
+      "\"fiber.color_r\"");
+  names(R"({"quantity":"bcsdf_albedo","theta_i_deg":0,"fiber":3})", "\"fiber\"");
+}
+
+TEST(EvalFormat, ADuplicateFieldKeepsTheId) {
+  EXPECT_EQ(answer(R"({"id":5,"quantity":"sg_mass","sharpness":1,"sharpness":1})")["id"], 5);
+}
+
+TEST(EvalAgreement, NumbersReadBackExactly) {
+  const Vec3d wi(0.6, 0.8, 0.0);
+  const Vec3d wo(-0.6, 0.0, 0.8);
+  expect_color(value_of("{\"quantity\":\"bcsdf\"," + kFiber + R"(,"wi":[0.6,0.8,0],"wo":[-0.6,0,0.8]})"),
+               evaluate_bcsdf(fiber(), wi, wo));
+  expect_color(
+      value_of("{\"quantity\":\"bcsdf\"," + kFiber + R"(,"wi":[0.6,0.8,0],"wo":[-0.6,0,0.8],"lobe":"r"})"),
+      evaluate_bcsdf(fiber(), wi, wo, Lobe::kR));
+  expect_color(value_of("{\"quantity\":\"bcsdf_albedo\"," + kFiber + R"(,"theta_i_deg":-30})"),
+               bcsdf_albedo(fiber(), radians(-30.0)));
+  const std::pair<const char*, SgMethod> methods[] = {{"printed", SgMethod::kPrinted},
+                                                      {"default", SgMethod::kDefault},
+                                                      {"quadrature", SgMethod::kQuadrature}};
+  for (const auto& [name, method] : methods) {
+    expect_color(value_of("{\"quantity\":\"sg_scatter\"," + kFiber +
+                          R"(,"axis":[0.6,0.8,0],"sharpness":150,"wo":[-0.6,0,0.8],"lobe":"tt","method":")" +
+                          name + "\"}"),
+                 sg_scatter(fiber(), {wi, 150.0}, wo, method, Lobe::kTt));
+  }
+  const Json rows = value_of("{\"quantity\":\"bcsdf_sh\"," + kFiber + R"(,"theta_o_deg":20,"order":3})");
+  const std::vector<Rgbd> exact = bcsdf_sh(fiber(), radians(20.0), 3);
+  ASSERT_EQ(rows.size(), 16U);
+  for (std::size_t j = 0; j < 16; ++j) expect_color(rows[j], exact[j]);
+}
+
+TEST(EvalLaw, BasisQuantities) {
+  // Known values: sqrt(1 / 4 pi), and band 1 in the order y, z, x.
+  const Json y = value_of(R"({"quantity":"sh","order":1,"direction":[0,0,1.0005]})");
+  ASSERT_EQ(y.size(), 4U);
+  EXPECT_NEAR(y[0].get<double>(), 0.28209479177387814, 1e-15);
+  EXPECT_NEAR(y[2].get<double>(), 0.48860251190291992, 1e-15);
+  EXPECT_EQ(y[1].get<double>(), 0.0);
+
+  // A quarter turn about z takes the lobe along x (index 3) to y (index 1).
+  const Json turned = value_of(
+      R"({"quantity":"sh_rotate","order":1,"rotation":[0,-1,0,1,0,0,0,0,1],"coefficients":[0.5,0,0,1]})");
+  EXPECT_NEAR(turned[0].get<double>(), 0.5, 1e-14);
+  EXPECT_NEAR(turned[1].get<double>(), 1.0, 1e-14);
+  EXPECT_NEAR(turned[3].get<double>(), 0.0, 1e-14);
+
+  EXPECT_NEAR(value_of(R"({"quantity":"sg_mass","sharpness":3})").get<double>(),
+              2 * kPi * (1 - std::exp(-6.0)) / 3, 1e-14);
+  const Json product = value_of(
+      R"({"quantity":"sg_product","axis_a":[1,0,0],"sharpness_a":3,"axis_b":[0,1,0],"sharpness_b":4})");
+  EXPECT_NEAR(product["sharpness"].get<double>(), 5.0, 1e-14);
+  EXPECT_NEAR(product["log_scale"].get<double>(), -2.0, 1e-14);
+  EXPECT_NEAR(product["axis"][0].get<double>(), 0.6, 1e-15);
+  EXPECT_NEAR(product["axis"][1].get<double>(), 0.8, 1e-15);
+  const Json zonal = value_of(R"({"quantity":"sg_zonal","sharpness":2,"order":1})");
+  EXPECT_NEAR(zonal[0].get<double>(), 0.28209479177387814, 1e-15);
+  EXPECT_NEAR(zonal[1].get<double>(), 0.48860251190291992 * (1 / std::tanh(2.0) - 0.5), 1e-15);
+}
+
+TEST(EvalStability, ValuesAreFiniteAtTheEndsOfTheRanges) {
+  for (const char* beta : {"0.01", "90"}) {
+    const std::string ends =
+        std::string(R"("fiber":{"color_r":[0,1,0.5],"color_tt":[1,0,0.5],"beta_r_deg":)") + beta +
+        ",\"beta_tt_deg\":" + beta + ",\"gamma_tt_deg\":" + (beta[0] == '0' ? "0.01" : "360") + "}";
+    EXPECT_EQ(run("{\"quantity\":\"bcsdf\"," + ends + R"(,"wi":[1,0,0],"wo":[-1,0,0]})").status, 0);
+    EXPECT_EQ(run("{\"quantity\":\"bcsdf_sh\"," + ends + R"(,"theta_o_deg":90,"order":10})").status, 0);
+    for (const char* sharpness : {"0", "1e-300", "1e8", "1e15"}) {
+      for (const char* method : {"printed", "default", "quadrature"}) {
+        EXPECT_EQ(
+            run("{\"quantity\":\"sg_scatter\"," + ends + R"(,"axis":[0,1,0],"wo":[0,-1,0],"sharpness":)" +
+                sharpness + ",\"method\":\"" + method + "\"}")
+                .status,
+            0)
+            << beta << " " << sharpness << " " << method;
+      }
+      EXPECT_EQ(
+          run(std::string(R"({"quantity":"sg_zonal","order":10,"sharpness":)") + sharpness + "}").status, 0);
+      EXPECT_EQ(run(std::string(R"({"quantity":"sg_mass","sharpness":)") + sharpness + "}").status, 0);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace heddle
