@@ -39,6 +39,7 @@
 #include "fibers/math/random.h"
 #include "fibers/math/sampling.h"
 #include "fibers/tracing/path_walk.h"
+#include "fibers/tracing/segment_origins.h"
 #include "fibers/tracing/tile_trace.h"
 #include "formats/input_error.h"
 #include "render/multiple_scattering.h"
@@ -70,8 +71,8 @@ double light_azimuth(int light) {
   return kLightAzimuth[static_cast<std::size_t>(light) % kLightAzimuth.size()];
 }
 
-enum Method { kReference, kExact, kVolume, kMidpoint, kFloor, kMethods };
-constexpr std::array<const char*, kMethods> kMethodNames = {"reference", "exact", "volume", "midpoint",
+enum Method { kReference, kExact, kVolume, kOrigin, kFloor, kMethods };
+constexpr std::array<const char*, kMethods> kMethodNames = {"reference", "exact", "volume", "origin",
                                                             "floor"};
 enum Part { kSingle, kMultiple, kTotal, kParts };
 constexpr std::array<const char*, kParts> kPartNames = {"single", "multiple", "total"};
@@ -109,6 +110,8 @@ class Swatch {
         options_(options),
         scene_(pack.exemplar),
         trace_(scene_),
+        origins_(
+            find_segment_origins(scene_, pack.light_from_both_sides, OriginChoice::kExposed, options.seed)),
         bricks_(*pack.volume),
         single_(&*pack.ssdf, nullptr, pack.materials),
         multiple_(*pack.transfer, pack.materials),
@@ -134,7 +137,7 @@ class Swatch {
       if (const auto vertex = trace_.first(origin, -wo)) {
         add_reference(*vertex, wo, random, scale, sum);
         add_precomputed(vertex->segment, vertex->tangent, wo, scale, sum[kExact]);
-        add_midpoint_single(*vertex, wo, scale, sum[kMidpoint][kSingle]);
+        add_origin_single(*vertex, wo, scale, sum[kOrigin][kSingle]);
         for (int k = 0; k < options_.floor_paths; ++k) {
           add_floor_multiple(*vertex, wo, random, scale / options_.floor_paths, sum[kFloor][kMultiple]);
         }
@@ -143,7 +146,7 @@ class Swatch {
         add_precomputed(hit->segment, exemplar.segment_tangent(hit->segment), wo, scale, sum[kVolume]);
       }
     }
-    sum[kMidpoint][kMultiple] = sum[kExact][kMultiple];
+    sum[kOrigin][kMultiple] = sum[kExact][kMultiple];
     sum[kFloor][kSingle] = sum[kReference][kSingle];
     return sum;
   }
@@ -187,11 +190,11 @@ class Swatch {
     }
   }
 
-  void add_midpoint_single(const TileTrace::Vertex& hit, const Vec3& wo, double scale, Values& sum) const {
-    const TileTrace::Vertex midpoint = trace_.at_midpoint(hit.segment);
+  void add_origin_single(const TileTrace::Vertex& hit, const Vec3& wo, double scale, Values& sum) const {
+    const TileTrace::Vertex origin = trace_.at(origins_.position[hit.segment], hit.segment);
     const Mat3 frame = frame_about(hit.tangent);
     for (int l = 0; l < kLights; ++l) {
-      if (!trace_.escapes(midpoint, lights_[l])) continue;
+      if (!trace_.escapes(origin, lights_[l])) continue;
       sum[l] +=
           scale *
           scattered(hit.material, frame.transpose() * lights_[l], frame.transpose() * wo).cast<double>();
@@ -228,6 +231,7 @@ class Swatch {
   const Options& options_;
   TileScene scene_;
   TileTrace trace_;
+  SegmentOrigins origins_;
   IdBricks bricks_;
   SingleScattering single_;
   MultipleScattering multiple_;
@@ -293,7 +297,7 @@ void print_report(const FabricPack& pack, const Options& options, const std::arr
              "RMSE of total", "RMSE of part, r / g / b");
   for (int m = kExact; m < kMethods; ++m) {
     for (int p = 0; p < kParts; ++p) {
-      if ((m == kMidpoint && p == kMultiple) || (m == kFloor && p == kSingle)) continue;  // another method's
+      if ((m == kOrigin && p == kMultiple) || (m == kFloor && p == kSingle)) continue;  // another method's
       const Comparison all = compare(halves, m, p, -1);
       fmt::print("{:<10}{:<10}{:>12.4f}{:>12.2f} %{:>14.2f} %    ", kMethodNames[m], kPartNames[p],
                  all.mean / all.reference, 100 * all.rmse / all.reference, 100 * all.rmse / total);
