@@ -32,7 +32,7 @@ struct SgSumShape {
 
 class SgSumFit {
  public:
-  static constexpr double kBlur = 30;
+  static constexpr double kBlur = 120;
 
   SgSumFit(int resolution, const SgSumShape& shape);
 
