@@ -1,25 +1,24 @@
-// How far the precomputed methods are from path tracing on a flat, endless cloth: 41 views x 12 directional
-// lights, as in Figure 13 of Khungurn 2017. Not a test: it prints, and writes PREFIX.csv (every value) and
-// PREFIX.svg (curves).
+// How far the precomputed methods are from path tracing on a flat, endless cloth: 41 views x 12 directional lights, as in
+// Figure 13 of Khungurn 2017. Not a test: it prints, and writes PREFIX.csv (every value) and PREFIX.svg (curves).
 //
-//   heddle_flat_swatch PACK [--paths N] [--seed S] [--out PREFIX]
+//   heddle_flat_swatch PACK [--paths N] [--floor-paths K] [--seed S] [--out PREFIX]
 //
-// Views: theta_o = -80, -76, .. 80 degrees in the xz plane. Lights: theta = 10, 30, 50, 70 degrees at
-// azimuths 0, 60, 135 degrees from +x, irradiance 1 across the light's axis. Values: radiance averaged over
-// the tile, rgb. One walk of the reference serves all lights: next-event estimation of each at every vertex.
+// Views: theta_o = -80, -76, .. 80 degrees in the xz plane. Lights: theta = 10, 30, 50, 70 degrees at azimuths 0, 60, 135
+// degrees from +x, irradiance 1 across the light's axis. Values: radiance averaged over the tile, rgb.
+// One walk of the reference serves all lights: next-event estimation of each at every vertex.
 // The methods shade the same eye rays:
-//   exact     eye rays against the fibers, single scattering by SSDF sign, multiple scattering by the cells'
-//   transfer volume    the same with eye rays through the id volume midpoint  exact, with the visibility of
-//   single scattering from a shadow ray at the segment's midpoint: what the SSDF encodes floor     exact,
-//   with single scattering of the reference and multiple scattering by the transfer of the hit point itself,
-//   to
-//             the same SH order: what the truncation alone costs. One path per --floor-paths from the hit
-//             point: 4 pi * throughput * K(w0 . light) * sum over j of Y_j(w1) c_S[j], K the reproducing
-//             kernel sum (2 l + 1) / 4 pi P_l.
+//   exact     eye rays against the fibers, single scattering by SSDF sign, multiple scattering by the cells' transfer
+//   volume    the same with eye rays through the id volume
+//   origin    exact, with the visibility of single scattering from a shadow ray at the segment's origin: what the SSDF
+//             encodes
+//   floor     exact, with the single scattering of the reference, and multiple scattering by the transfer to the hit point
+//             itself, to the same SH order: what the truncation alone costs. K paths from the hit point per eye ray, each
+//             4 pi * throughput * K(w0 . light) * sum over j of Y_j(w1) c_S[j], K the reproducing kernel
+//             sum of (2 l + 1) / 4 pi P_l.
 //
-// Error: sqrt(mean of (F1 - R1)(F2 - R2)) / mean R, where 1 and 2 are two independent halves of all samples,
-// so that neither the reference's noise nor the methods' own counts. A method shares eye rays with the half
-// of the reference it is compared with, which takes out the noise that they have in common.
+// Error: sqrt(mean of (F1 - R1)(F2 - R2)) / mean R, where 1 and 2 are two independent halves of all samples, so that
+// neither the reference's noise nor the methods' own counts. A method shares eye rays with the half of the reference it is
+// compared with, which takes out the noise that they have in common.
 
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
