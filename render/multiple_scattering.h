@@ -1,19 +1,18 @@
 #ifndef HEDDLE_RENDER_MULTIPLE_SCATTERING_H_
 #define HEDDLE_RENDER_MULTIPLE_SCATTERING_H_
-// Light that scatters more than once, from the precomputed transfer of a cell (Khungurn 2017, section 5.3.1),
-// in real spherical harmonics. Everything is in fabric space. Radiance for a light of irradiance 1, before
-// macroscopic shadows.
+// Light that scatters more than once, from the precomputed transfer of a cell (Khungurn 2017, section 5.3.1), in real
+// spherical harmonics. Everything is in fabric space. Radiance for a light of irradiance 1, before macroscopic shadows.
 //
 //   c_light[j]   directional: Y_j(w); spherical Gaussian: A_l(sharpness) Y_lm(axis)
 //   c_T          = a^T c_light: the indirect light that arrives at the cell (Transfer::incoming)
-//   outgoing     = c_S(theta_o) . D(R) c_T: rotated into the wo-space (x = tangent, wo in the xy plane, y >
-//   0) of the BCSDF's
-//                  coefficients
-// A truncated expansion rings: an incoming field, and with it the outgoing radiance, can be slightly
-// negative. Signs are kept, so that sums over samples have the expansion's mean; who shows a picture may
-// clamp it. Under light from the face only, the transfer is 0 for light from below; its expansion is not, so
-// directional light from below is cut here. Cost at order 5: incoming 0.5 us, outgoing 0.5 us. Tested in
-// tests/render/multiple_scattering_test.cpp.
+//   outgoing     = c_S(theta_o) . D(R) c_T: rotated into the wo-space (x = tangent, wo in the xy plane, y > 0) of the
+//                  BCSDF's coefficients
+//
+// A truncated expansion rings: an incoming field, and with it the outgoing radiance, can be slightly negative. Signs are
+// kept, so that sums over samples have the expansion's mean; who shows a picture may clamp it.
+// Under light from the face only, the transfer is 0 for light from below; its expansion is not, so directional light from
+// below is cut here.
+// Tested in tests/render/multiple_scattering_test.cpp.
 
 #include <array>
 #include <optional>

@@ -1,5 +1,6 @@
 #include "render/scene_config.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace heddle {
@@ -25,6 +26,14 @@ Rgb color(const std::array<double, 3>& values) {
   return vector_of(values).cast<float>().array();
 }
 
+std::array<int, 2> whole_pixels(const TomlTable& table, std::string_view key, double min) {
+  const std::array<double, 2> values = table.number2(key, {min, 16384});
+  if (values[0] != std::floor(values[0]) || values[1] != std::floor(values[1])) {
+    table.fail(key, "expected whole numbers of pixels");
+  }
+  return {static_cast<int>(values[0]), static_cast<int>(values[1])};
+}
+
 CameraConfig read_camera(const TomlTable& table) {
   CameraConfig camera;
   camera.position = vector_of(table.number3("position_mm", kAnyLength));
@@ -34,12 +43,9 @@ CameraConfig read_camera(const TomlTable& table) {
   camera.fov_axis = table.choice("fov_axis", {"horizontal", "vertical"}) == "horizontal"
                         ? FovAxis::kHorizontal
                         : FovAxis::kVertical;
-  const std::array<double, 2> resolution = table.number2("resolution_px", {1, 16384});
-  if (resolution[0] != std::floor(resolution[0]) || resolution[1] != std::floor(resolution[1])) {
-    table.fail("resolution_px", "expected whole numbers of pixels");
-  }
-  camera.width = static_cast<int>(resolution[0]);
-  camera.height = static_cast<int>(resolution[1]);
+  const std::array<int, 2> resolution = whole_pixels(table, "resolution_px", 1);
+  camera.width = resolution[0];
+  camera.height = resolution[1];
   const Vec3d view = camera.look_at - camera.position;
   if (view.norm() < 1e-9) table.fail("look_at_mm", "expected a point different from position_mm");
   // Below a milliradian the picture's upright direction would be decided by rounding.
@@ -47,6 +53,48 @@ CameraConfig read_camera(const TomlTable& table) {
     table.fail("up", "expected a direction that is not parallel to the view direction");
   }
   return camera;
+}
+
+ReferenceConfig read_reference(const TomlTable& table, const CameraConfig& camera) {
+  ReferenceConfig reference;
+  const std::array<int, 2> corner = whole_pixels(table, "corner_px", 0);
+  const std::array<int, 2> size = whole_pixels(table, "size_px", 1);
+  reference.crop = {corner[0], corner[1], size[0], size[1]};
+  if (corner[0] + size[0] > camera.width || corner[1] + size[1] > camera.height) {
+    table.fail("size_px", "expected a rectangle inside the picture");
+  }
+  reference.spp = static_cast<int>(table.integer("spp", 2, 1 << 24, reference.spp));
+  if (reference.spp % 2 != 0) table.fail("spp", "expected an even number: the path tracer keeps two half pictures");
+  reference.local = table.boolean("local", false);
+  return reference;
+}
+
+/// [camera] and every [[view]], which holds the same keys and a name.
+ViewConfig read_view(const TomlTable& table, const SceneConfig& scene, int default_spp) {
+  ViewConfig view;
+  view.camera = read_camera(table);
+  view.spp = static_cast<int>(table.integer("spp", 1, 1 << 24, default_spp));
+  if (scene.method == RenderMethod::kPath && view.spp % 2 != 0) {
+    table.fail("spp", "expected an even number: the path tracer keeps two half pictures");
+  }
+  if (const std::optional<TomlTable> reference = table.optional_table("reference")) {
+    view.reference = read_reference(*reference, view.camera);
+  }
+  return view;
+}
+
+std::string read_view_name(const TomlTable& table, const SceneConfig& scene) {
+  const std::string name = table.string("name");
+  const auto is_plain = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_';
+  };
+  if (name.empty() || !std::all_of(name.begin(), name.end(), is_plain)) {
+    table.fail("name", "expected letters, digits, - and _: it becomes a file name");
+  }
+  for (const ViewConfig& view : scene.views) {
+    if (view.name == name) table.fail("name", "expected a name that no other view has");
+  }
+  return name;
 }
 
 Light read_light(const TomlTable& table) {
@@ -112,20 +160,23 @@ SceneConfig read_scene_config(const TomlTable& document) {
   SceneConfig scene;
   scene.name = document.string("name");
   scene.background = color(document.number3("background", kLight, std::array<double, 3>{0, 0, 0}));
-  scene.camera = read_camera(document.table("camera"));
   for (const TomlTable& table : document.tables("light")) scene.lights.push_back(read_light(table));
   if (scene.lights.empty()) document.fail("light", "expected at least one [[light]]");
   for (const TomlTable& table : document.tables("cloth")) scene.cloths.push_back(read_cloth(table));
   if (scene.cloths.empty()) document.fail("cloth", "expected at least one [[cloth]]");
   for (const TomlTable& table : document.tables("mesh")) scene.meshes.push_back(read_mesh(table));
+  int default_spp = 16;
   if (const std::optional<TomlTable> render = document.optional_table("render")) {
     scene.method = *render_method_of(render->choice("method", {"exact", "volume", "path"}, "exact"));
-    scene.spp = static_cast<int>(render->integer("spp", 1, 1 << 24, 16));
+    default_spp = static_cast<int>(render->integer("spp", 1, 1 << 24, default_spp));
     scene.seed = static_cast<std::uint64_t>(render->integer("seed", 0, INT64_MAX, 1));
     scene.shadow_sigma_mm = render->optional_number("shadow_sigma_mm", {0, 1e3});
-    if (scene.method == RenderMethod::kPath && scene.spp % 2 != 0) {
-      render->fail("spp", "expected an even number: the path tracer keeps two half pictures");
-    }
+  }
+  scene.views.push_back(read_view(document.table("camera"), scene, default_spp));
+  for (const TomlTable& table : document.tables("view")) {
+    const std::string name = read_view_name(table, scene);
+    scene.views.push_back(read_view(table, scene, default_spp));
+    scene.views.back().name = name;
   }
   document.finish();
   return scene;

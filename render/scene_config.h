@@ -1,6 +1,6 @@
 #ifndef HEDDLE_RENDER_SCENE_CONFIG_H_
 #define HEDDLE_RENDER_SCENE_CONFIG_H_
-// What a scene TOML says: camera, lights, pieces of cloth, black meshes, how to render. Keys, units and
+// What a scene TOML says: views, lights, pieces of cloth, black meshes, how to render. Keys, units and
 // ranges: configs/README.md. Lengths in millimetres, angles in radians after parsing. Errors: ConfigError
 // with its place. Tested in tests/render/scene_config_test.cpp.
 
@@ -38,9 +38,24 @@ struct ClothConfig {
   bool underlay = false;         // a black copy of the cloth's underside just below it
 };
 
+/// A path-traced crop of a view, to compare the view with.
+struct ReferenceConfig {
+  PixelRect crop;      // inside the view's frame
+  int spp = 64;        // even
+  bool local = false;  // paths end where they leave the shell
+};
+
+/// One picture that the scene asks for.
+struct ViewConfig {
+  std::string name;  // part of the file's name; empty for the view of [camera]
+  CameraConfig camera;
+  int spp = 16;      // samples per pixel; even for kPath
+  std::optional<ReferenceConfig> reference;
+};
+
 struct SceneConfig {
   std::string name;
-  CameraConfig camera;
+  std::vector<ViewConfig> views;     // that of [camera] first, then every [[view]]
   std::vector<Light> lights;
   Rgb background = Rgb(0, 0, 0);  // radiance seen by eye rays that hit nothing; lights nothing
   std::vector<ClothConfig> cloths;

@@ -1,22 +1,19 @@
 #ifndef HEDDLE_RENDER_SINGLE_SCATTERING_H_
 #define HEDDLE_RENDER_SINGLE_SCATTERING_H_
-// Light that scatters once, at the fiber the eye sees: BCSDF times precomputed visibility, for one light at a
-// time (Khungurn 2017, section 5.2). Results are radiance for a light of irradiance 1, before macroscopic
-// shadows.
+// Light that scatters once, at the fiber the eye sees: BCSDF times precomputed visibility, for one light at a time
+// (Khungurn 2017, section 5.2). Results are radiance for a light of irradiance 1, before macroscopic shadows.
 //
-// A directional light along w:      V(w) S(w, wo) cos(theta_w), V = 1 where the signed distance to the edge
-// of visibility is > 0. A spherical Gaussian (axis xi, sharpness l, mass M(l)) is blended linearly in l over
-// [100, 200] between
-//   soft:   1 / M(l) sum over lobes q of w_q / M(s) exp(n_q - s - l) Gamma(v_q / n_q, n_q, wo),  v_q = s xi_q
-//   + l xi, n_q = |v_q|,
-//           s the lobes' sharpness;
+// A directional light along w:      V(w) S(w, wo) cos(theta_w), V = 1 where the signed distance to the edge of visibility
+// is > 0. A spherical Gaussian (axis xi, sharpness l, mass M(l)) is blended linearly in l over [100, 200] between
+//   soft:   1 / M(l) sum over lobes q of w_q / M(s) exp(n_q - s - l) Gamma(v_q / n_q, n_q, wo),
+//           v_q = s xi_q + l xi, n_q = |v_q|, s the lobes' sharpness;
 //   sharp:  (1 + erf(sqrt(l / 2) d(xi))) / 2 * Gamma(xi, l, wo) / M(l),  d the signed distance.
 //
-// Two spaces. Draped cloth is a bent copy of the flat exemplar: BCSDF and Gamma take world-space unit vectors
-// (angles as they are in the picture), signed distances are looked up in fabric space, where they were baked.
-// The lobes of the soft branch live in fabric space too, and a product of lobe and light only makes sense in
-// one space, so all of that branch, Gamma included, is evaluated in fabric space. Gamma is what
-// BcsdfTable::sg_scatter computes; its errors are stated there. Tested in
+// Two spaces. Draped cloth is a bent copy of the flat exemplar: BCSDF and Gamma take world-space unit vectors (angles as
+// they are in the picture), signed distances are looked up in fabric space, where they were baked. The lobes of the soft
+// branch live in fabric space too, and a product of lobe and light only makes sense in one space, so all of that branch,
+// Gamma included, is evaluated in fabric space.
+// Gamma is what BcsdfTable::sg_scatter computes; its errors are stated there. Tested in
 // tests/render/single_scattering_test.cpp.
 
 #include <span>

@@ -1,25 +1,24 @@
-// How far the precomputed methods are from path tracing on a flat, endless cloth: 41 views x 12 directional
-// lights, as in Figure 13 of Khungurn 2017. Not a test: it prints, and writes PREFIX.csv (every value) and
-// PREFIX.svg (curves).
+// How far the precomputed methods are from path tracing on a flat, endless cloth: 41 views x 12 directional lights, as in
+// Figure 13 of Khungurn 2017. Not a test: it prints, and writes PREFIX.csv (every value) and PREFIX.svg (curves).
 //
-//   heddle_flat_swatch PACK [--paths N] [--seed S] [--out PREFIX]
+//   heddle_flat_swatch PACK [--paths N] [--floor-paths K] [--seed S] [--out PREFIX]
 //
-// Views: theta_o = -80, -76, .. 80 degrees in the xz plane. Lights: theta = 10, 30, 50, 70 degrees at
-// azimuths 0, 60, 135 degrees from +x, irradiance 1 across the light's axis. Values: radiance averaged over
-// the tile, rgb. One walk of the reference serves all lights: next-event estimation of each at every vertex.
+// Views: theta_o = -80, -76, .. 80 degrees in the xz plane. Lights: theta = 10, 30, 50, 70 degrees at azimuths 0, 60, 135
+// degrees from +x, irradiance 1 across the light's axis. Values: radiance averaged over the tile, rgb.
+// One walk of the reference serves all lights: next-event estimation of each at every vertex.
 // The methods shade the same eye rays:
-//   exact     eye rays against the fibers, single scattering by SSDF sign, multiple scattering by the cells'
-//   transfer volume    the same with eye rays through the id volume midpoint  exact, with the visibility of
-//   single scattering from a shadow ray at the segment's midpoint: what the SSDF encodes floor     exact,
-//   with single scattering of the reference and multiple scattering by the transfer of the hit point itself,
-//   to
-//             the same SH order: what the truncation alone costs. One path per --floor-paths from the hit
-//             point: 4 pi * throughput * K(w0 . light) * sum over j of Y_j(w1) c_S[j], K the reproducing
-//             kernel sum (2 l + 1) / 4 pi P_l.
+//   exact     eye rays against the fibers, single scattering by SSDF sign, multiple scattering by the cells' transfer
+//   volume    the same with eye rays through the id volume
+//   origin    exact, with the visibility of single scattering from a shadow ray at the segment's origin: what the SSDF
+//             encodes
+//   floor     exact, with the single scattering of the reference, and multiple scattering by the transfer to the hit point
+//             itself, to the same SH order: what the truncation alone costs. K paths from the hit point per eye ray, each
+//             4 pi * throughput * K(w0 . light) * sum over j of Y_j(w1) c_S[j], K the reproducing kernel
+//             sum of (2 l + 1) / 4 pi P_l.
 //
-// Error: sqrt(mean of (F1 - R1)(F2 - R2)) / mean R, where 1 and 2 are two independent halves of all samples,
-// so that neither the reference's noise nor the methods' own counts. A method shares eye rays with the half
-// of the reference it is compared with, which takes out the noise that they have in common.
+// Error: sqrt(mean of (F1 - R1)(F2 - R2)) / mean R, where 1 and 2 are two independent halves of all samples, so that
+// neither the reference's noise nor the methods' own counts. A method shares eye rays with the half of the reference it is
+// compared with, which takes out the noise that they have in common.
 
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
@@ -39,6 +38,7 @@
 #include "fibers/math/random.h"
 #include "fibers/math/sampling.h"
 #include "fibers/tracing/path_walk.h"
+#include "fibers/tracing/segment_origins.h"
 #include "fibers/tracing/tile_trace.h"
 #include "formats/input_error.h"
 #include "render/multiple_scattering.h"
@@ -70,8 +70,8 @@ double light_azimuth(int light) {
   return kLightAzimuth[static_cast<std::size_t>(light) % kLightAzimuth.size()];
 }
 
-enum Method { kReference, kExact, kVolume, kMidpoint, kFloor, kMethods };
-constexpr std::array<const char*, kMethods> kMethodNames = {"reference", "exact", "volume", "midpoint",
+enum Method { kReference, kExact, kVolume, kOrigin, kFloor, kMethods };
+constexpr std::array<const char*, kMethods> kMethodNames = {"reference", "exact", "volume", "origin",
                                                             "floor"};
 enum Part { kSingle, kMultiple, kTotal, kParts };
 constexpr std::array<const char*, kParts> kPartNames = {"single", "multiple", "total"};
@@ -109,6 +109,8 @@ class Swatch {
         options_(options),
         scene_(pack.exemplar),
         trace_(scene_),
+        origins_(
+            find_segment_origins(scene_, pack.light_from_both_sides, OriginChoice::kExposed, options.seed)),
         bricks_(*pack.volume),
         single_(&*pack.ssdf, nullptr, pack.materials),
         multiple_(*pack.transfer, pack.materials),
@@ -134,7 +136,7 @@ class Swatch {
       if (const auto vertex = trace_.first(origin, -wo)) {
         add_reference(*vertex, wo, random, scale, sum);
         add_precomputed(vertex->segment, vertex->tangent, wo, scale, sum[kExact]);
-        add_midpoint_single(*vertex, wo, scale, sum[kMidpoint][kSingle]);
+        add_origin_single(*vertex, wo, scale, sum[kOrigin][kSingle]);
         for (int k = 0; k < options_.floor_paths; ++k) {
           add_floor_multiple(*vertex, wo, random, scale / options_.floor_paths, sum[kFloor][kMultiple]);
         }
@@ -143,7 +145,7 @@ class Swatch {
         add_precomputed(hit->segment, exemplar.segment_tangent(hit->segment), wo, scale, sum[kVolume]);
       }
     }
-    sum[kMidpoint][kMultiple] = sum[kExact][kMultiple];
+    sum[kOrigin][kMultiple] = sum[kExact][kMultiple];
     sum[kFloor][kSingle] = sum[kReference][kSingle];
     return sum;
   }
@@ -187,11 +189,11 @@ class Swatch {
     }
   }
 
-  void add_midpoint_single(const TileTrace::Vertex& hit, const Vec3& wo, double scale, Values& sum) const {
-    const TileTrace::Vertex midpoint = trace_.at_midpoint(hit.segment);
+  void add_origin_single(const TileTrace::Vertex& hit, const Vec3& wo, double scale, Values& sum) const {
+    const TileTrace::Vertex origin = trace_.at(origins_.position[hit.segment], hit.segment);
     const Mat3 frame = frame_about(hit.tangent);
     for (int l = 0; l < kLights; ++l) {
-      if (!trace_.escapes(midpoint, lights_[l])) continue;
+      if (!trace_.escapes(origin, lights_[l])) continue;
       sum[l] +=
           scale *
           scattered(hit.material, frame.transpose() * lights_[l], frame.transpose() * wo).cast<double>();
@@ -228,6 +230,7 @@ class Swatch {
   const Options& options_;
   TileScene scene_;
   TileTrace trace_;
+  SegmentOrigins origins_;
   IdBricks bricks_;
   SingleScattering single_;
   MultipleScattering multiple_;
@@ -293,7 +296,7 @@ void print_report(const FabricPack& pack, const Options& options, const std::arr
              "RMSE of total", "RMSE of part, r / g / b");
   for (int m = kExact; m < kMethods; ++m) {
     for (int p = 0; p < kParts; ++p) {
-      if ((m == kMidpoint && p == kMultiple) || (m == kFloor && p == kSingle)) continue;  // another method's
+      if ((m == kOrigin && p == kMultiple) || (m == kFloor && p == kSingle)) continue;  // another method's
       const Comparison all = compare(halves, m, p, -1);
       fmt::print("{:<10}{:<10}{:>12.4f}{:>12.2f} %{:>14.2f} %    ", kMethodNames[m], kPartNames[p],
                  all.mean / all.reference, 100 * all.rmse / all.reference, 100 * all.rmse / total);

@@ -79,10 +79,12 @@ std::string with(std::string text, const std::string& from, const std::string& t
 TEST_F(SceneConfigTest, ReadsEveryKey) {
   const SceneConfig scene = read(kScene);
   EXPECT_EQ(scene.name, "test");
-  EXPECT_EQ(scene.camera.fov_axis, FovAxis::kVertical);
-  EXPECT_NEAR(scene.camera.fov, radians(30), 1e-12);
-  EXPECT_EQ(scene.camera.width, 640);
-  EXPECT_EQ(scene.camera.up, Vec3d(0, 0, 1));
+  ASSERT_EQ(scene.views.size(), 1U);
+  EXPECT_EQ(scene.views[0].name, "");
+  EXPECT_EQ(scene.views[0].camera.fov_axis, FovAxis::kVertical);
+  EXPECT_NEAR(scene.views[0].camera.fov, radians(30), 1e-12);
+  EXPECT_EQ(scene.views[0].camera.width, 640);
+  EXPECT_EQ(scene.views[0].camera.up, Vec3d(0, 0, 1));
   ASSERT_EQ(scene.lights.size(), 2U);
   EXPECT_NEAR(scene.lights[0].axis.y(), 0.6, 1e-6);
   EXPECT_EQ(scene.lights[1].type, LightType::kSphericalGaussian);
@@ -96,7 +98,7 @@ TEST_F(SceneConfigTest, ReadsEveryKey) {
   ASSERT_EQ(scene.meshes.size(), 1U);
   EXPECT_EQ(scene.meshes[0].mm_per_unit, 10);
   EXPECT_EQ(scene.method, RenderMethod::kPath);
-  EXPECT_EQ(scene.spp, 64);
+  EXPECT_EQ(scene.views[0].spp, 64);
   EXPECT_EQ(scene.seed, 7U);
   EXPECT_EQ(scene.shadow_sigma_mm, 0.5);
   EXPECT_NEAR(scene.background[1], 0.2, 1e-7);
@@ -106,6 +108,43 @@ TEST_F(SceneConfigTest, Defaults) {
   const SceneConfig scene = read(kScene.substr(0, kScene.find("[render]")));
   EXPECT_EQ(scene.method, RenderMethod::kExact);
   EXPECT_FALSE(scene.shadow_sigma_mm);
+}
+
+const std::string kView = R"([[view]]
+name = "close-up"
+position_mm = [0, -40, 30]
+look_at_mm = [0, 0, 10]
+fov_deg = 20
+fov_axis = "horizontal"
+resolution_px = [320, 200]
+spp = 8
+[view.reference]
+corner_px = [300, 0]
+size_px = [20, 10]
+spp = 256
+local = true
+)";
+
+TEST_F(SceneConfigTest, ViewsAndReferences) {
+  const SceneConfig scene = read(kScene + kView);
+  ASSERT_EQ(scene.views.size(), 2U);
+  EXPECT_FALSE(scene.views[0].reference);
+  EXPECT_EQ(scene.views[1].name, "close-up");
+  EXPECT_EQ(scene.views[1].camera.height, 200);
+  EXPECT_EQ(scene.views[1].spp, 8);
+  ASSERT_TRUE(scene.views[1].reference);
+  EXPECT_EQ(scene.views[1].reference->crop.x0, 300);
+  EXPECT_EQ(scene.views[1].reference->crop.height, 10);
+  EXPECT_EQ(scene.views[1].reference->spp, 256);
+  EXPECT_TRUE(scene.views[1].reference->local);
+  EXPECT_EQ(read(kScene + with(kView, "spp = 8\n", "")).views[1].spp, 64) << "that of [render]";
+
+  EXPECT_NE(message(kScene + with(kView, "close-up", "close/up")).find("file name"), std::string::npos);
+  EXPECT_NE(message(kScene + with(kView, "close-up", "..")).find("file name"), std::string::npos);
+  EXPECT_NE(message(kScene + kView + kView).find("no other view"), std::string::npos);
+  EXPECT_NE(message(kScene + with(kView, "spp = 8", "spp = 7")).find("even"), std::string::npos);
+  EXPECT_NE(message(kScene + with(kView, "[300, 0]", "[301, 0]")).find("inside"), std::string::npos);
+  EXPECT_NE(message(kScene + with(kView, "spp = 256", "spp = 3")).find("even"), std::string::npos);
 }
 
 TEST_F(SceneConfigTest, MistakesAreLocated) {

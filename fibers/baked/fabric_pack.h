@@ -1,0 +1,70 @@
+#ifndef HEDDLE_FIBERS_BAKED_FABRIC_PACK_H_
+#define HEDDLE_FIBERS_BAKED_FABRIC_PACK_H_
+// A pack: one folder that holds everything a renderer needs of one fabric, and a manifest.json with the size and the
+// XXH3-128 of every other file (and of itself). Files: fibers.safetensors always; ssdf.safetensors, sg.safetensors,
+// transfer.safetensors and volume.vdb where the pack was made with them.
+// Checks, in this order, before any file but the manifest is opened; the first that fails is the message:
+//   1. manifest.json is JSON in the layout of this version and its own checksum holds;
+//   2. every file name is a plain name of a file this version knows;
+//   3. every file exists and has the size stated;
+//   4. every file has the checksum stated.
+// Errors: FileError naming the file. Tested in tests/fibers/baked/fabric_pack_test.cpp.
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "fibers/baked/segment_visibility.h"
+#include "fibers/baked/transfer.h"
+#include "fibers/cloth/exemplar.h"
+#include "fibers/scattering/bcsdf_table.h"
+#include "formats/id_volume_file.h"
+
+namespace heddle {
+
+inline constexpr char kManifestName[] = "manifest.json";
+
+struct PackFile {
+  std::uint64_t bytes = 0;
+  std::string xxh3_128;  // 32 hexadecimal digits
+};
+
+struct PackManifest {
+  std::string name;             // of the fabric
+  std::string key;              // of the pack stage
+  std::string program_version;  // that wrote it
+  bool light_from_both_sides = false;
+  std::map<std::string, std::uint64_t> counts;  // "fibers", "segments", "cells"; for people and for `heddle check`
+  std::map<std::string, PackFile> files;        // by file name, without the manifest
+};
+
+struct FabricPack {
+  std::filesystem::path folder;
+  std::string name;
+  std::string key;
+  Exemplar exemplar;
+  bool light_from_both_sides = false;
+  std::optional<SsdfVisibility> ssdf;
+  std::optional<SgVisibility> sgs;
+  std::optional<Transfer> transfer;
+  std::optional<IdVolume> volume;
+  std::vector<BcsdfTable> materials;           // [material]
+  std::vector<std::uint32_t> cell_of_segment;  // [segment]; empty where there is no transfer
+};
+
+/// Hashes the files named in `manifest.files` inside `folder` (their sizes and checksums are filled in) and writes
+/// manifest.json, atomically, last.
+void write_manifest(const std::filesystem::path& folder, PackManifest manifest);
+
+/// Reads manifest.json and makes checks 1 to 4.
+PackManifest read_verified_manifest(const std::filesystem::path& folder);
+
+/// Verifies, then opens every file of the pack.
+FabricPack load_pack(const std::filesystem::path& folder);
+
+}  // namespace heddle
+
+#endif  // HEDDLE_FIBERS_BAKED_FABRIC_PACK_H_

@@ -1,0 +1,37 @@
+#include <iostream>
+
+#include "formats/input_error.h"
+#include "pipeline/commands.h"
+#include "pipeline/picture_compare.h"
+
+namespace heddle {
+namespace {
+
+/// A picture that cannot be read cannot be compared: status 2, as 1 says "beyond the limit" here.
+Image read_comparable(const std::filesystem::path& path) {
+  try {
+    return read_exr(path);
+  } catch (const FileError& error) {
+    throw ConfigError(std::string("not comparable: ") + error.what());
+  }
+}
+
+}  // namespace
+
+int compare_command(const CompareOptions& options, const CommonOptions& common) {
+  const PictureComparison comparison =
+      compare_images(read_comparable(options.a), options.a.string(), read_comparable(options.b), options.b.string(),
+                     options.layer);
+  if (options.output) write_difference(*options.output, comparison);
+  if (common.json) {
+    std::cout << comparison_report(comparison).dump(2) << '\n';
+  } else {
+    std::cout << comparison_text(comparison) << '\n';
+  }
+  const PictureError& error = comparison.error;
+  const bool rmse_beyond = options.max_rmse && error.relative_rmse > *options.max_rmse;
+  const bool mean_beyond = options.max_mean && error.relative_difference.abs().maxCoeff() > *options.max_mean;
+  return rmse_beyond || mean_beyond ? 1 : 0;
+}
+
+}  // namespace heddle

@@ -1,0 +1,246 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <iostream>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "fibers/baked/fabric_pack.h"
+#include "fibers/cloth/synthesize.h"
+#include "fibers/tracing/tile_scene.h"
+#include "formats/atomic_file.h"
+#include "formats/id_volume_file.h"
+#include "formats/image_file.h"
+#include "formats/input_error.h"
+#include "formats/obj_mesh.h"
+#include "formats/tensor_file.h"
+#include "pipeline/commands.h"
+#include "pipeline/stages.h"
+#include "render/scene_config.h"
+
+namespace heddle {
+namespace {
+
+namespace fs = std::filesystem;
+using Report = nlohmann::ordered_json;
+
+double rounded(double value) { return std::stod(fmt::format("{:.4g}", value)); }
+
+void describe_exemplar(const Exemplar& exemplar, std::uint64_t seed, Report& report) {
+  const ExemplarSummary summary = summarize(exemplar);
+  const TileScene scene(exemplar);
+  report["fibers"] = summary.fibers;
+  report["segments"] = summary.segments;
+  report["tile_mm"] = {rounded(exemplar.width_mm), rounded(exemplar.height_mm)};
+  report["tile_repeats"] = fmt::format("endless: a ray marches from tile to tile until it hits, leaves the cloth or has "
+                                       "crossed {} tiles",
+                                       TileScene::kMaxTiles);
+  report["thickness_mm"] = rounded(summary.thickness_mm);
+  report["volume_fraction"] = rounded(summary.volume_fraction);
+  report["mean_free_path_mm"] = rounded(scene.mean_free_path(seed, kMeanFreePathSamples));
+  report["mean_segment_mm"] = rounded(summary.mean_segment_mm);
+  report["fiber_length_mm_per_mm2"] = rounded(summary.areal_fiber_length_per_mm2);
+  report["fiber_wander_rms_deg"] = rounded(summary.wander_rms_deg);
+  report["ray_tracing_bytes"] = scene.memory_bytes();
+}
+
+Report describe_fabric(const fs::path& path, const CommonOptions& common) {
+  const FabricDocument fabric = read_fabric_document(path, common.seed);
+  Report report = {{"kind", "fabric config"}, {"name", fabric.config.name}, {"weave", fabric.config.weave.notation}};
+  report["light_from"] = fabric.config.light_from_both_sides ? "both" : "face";
+  report["seed"] = fabric.config.seed;
+  describe_exemplar(synthesize(fabric.config), fabric.config.seed, report);
+  return report;
+}
+
+Report describe_scene(const TomlTable& document) {
+  const SceneConfig scene = read_scene_config(document);
+  Report report = {{"kind", "scene config"}, {"name", scene.name}};
+  for (const ViewConfig& view : scene.views) {
+    report["view." + (view.name.empty() ? std::string("camera") : view.name)] =
+        fmt::format("{} x {} pixels, {} samples per pixel{}", view.camera.width, view.camera.height, view.spp,
+                    view.reference ? ", with a path-traced reference" : "");
+  }
+  report["method"] = render_method_name(scene.method);
+  report["lights"] = scene.lights.size();
+  Report fabrics = Report::array();
+  for (const ClothConfig& cloth : scene.cloths) fabrics.push_back(cloth.fabric.string());
+  report["fabrics"] = fabrics;
+  return report;
+}
+
+const char* type_name(TensorType type) {
+  switch (type) {
+    case TensorType::kU8: return "U8";
+    case TensorType::kU16: return "U16";
+    case TensorType::kU32: return "U32";
+    case TensorType::kU64: return "U64";
+    case TensorType::kI32: return "I32";
+    case TensorType::kF16: return "F16";
+    case TensorType::kF32: return "F32";
+    case TensorType::kF64: return "F64";
+  }
+  return "";
+}
+
+Report describe_tensors(const fs::path& path, const CommonOptions& common) {
+  const TensorFile file = TensorFile::read(path);
+  Report report = {{"kind", "tensor file"}};
+  for (const auto& [key, value] : file.metadata()) report["metadata." + key] = value;
+  for (const auto& [name, entry] : file.entries()) {
+    report["tensor." + name] = fmt::format("{} [{}]", type_name(entry.type), fmt::join(entry.shape, "]["));
+  }
+  const auto kind = file.metadata().find("kind");
+  if (kind != file.metadata().end() && kind->second == "fibers") {
+    describe_exemplar(read_exemplar(path), common.seed.value_or(1), report);
+  }
+  return report;
+}
+
+/// Bytes of a pack's tensor file, less those of the tensors that all segments share.
+std::uint64_t bytes_without_basis(const fs::path& path) {
+  std::uint64_t bytes = fs::file_size(path);
+  const TensorFile file = TensorFile::read(path);
+  for (const auto& [name, entry] : file.entries()) {
+    if (name == "mean" || name == "basis" || name == "axes") bytes -= entry.size;
+  }
+  return bytes;
+}
+
+Report describe_pack(const fs::path& folder) {
+  const PackManifest manifest = read_verified_manifest(folder);
+  Report report = {{"kind", "pack"}, {"name", manifest.name}, {"key", manifest.key}};
+  report["program_version"] = manifest.program_version;
+  report["light_from"] = manifest.light_from_both_sides ? "both" : "face";
+  for (const auto& [name, file] : manifest.files) report["file." + name] = fmt::format("{} bytes, checksum holds", file.bytes);
+  const FabricPack pack = load_pack(folder);
+  describe_exemplar(pack.exemplar, 1, report);
+  std::uint64_t segment_bytes = 0;
+  for (const char* name : {"fibers.safetensors", "ssdf.safetensors", "sg.safetensors"}) {
+    if (manifest.files.contains(name)) segment_bytes += bytes_without_basis(folder / name);
+  }
+  report["bytes_per_segment"] =
+      rounded(static_cast<double>(segment_bytes) / static_cast<double>(pack.exemplar.segment_count()));
+  if (pack.transfer) {
+    const auto& cells = pack.transfer->grid.cells;
+    report["transfer_order"] = pack.transfer->order;
+    report["cells"] = fmt::format("{} x {} x {}", cells[0], cells[1], cells[2]);
+    report["bytes_per_cell"] = rounded(static_cast<double>(manifest.files.at("transfer.safetensors").bytes) /
+                                       static_cast<double>(pack.transfer->grid.count()));
+  }
+  return report;
+}
+
+void describe_volume(const IdVolume& volume, Report& report) {
+  const auto filled = std::count_if(volume.ids.begin(), volume.ids.end(), [](std::int32_t id) { return id >= 0; });
+  report["kind"] = "segment-id volume";
+  report["voxels"] = fmt::format("{} x {} x {}", volume.size[0], volume.size[1], volume.size[2]);
+  report["voxel_um"] = {rounded(1e3 * volume.voxel_mm[0]), rounded(1e3 * volume.voxel_mm[1]), rounded(1e3 * volume.voxel_mm[2])};
+  report["origin_mm"] = {rounded(volume.origin_mm[0]), rounded(volume.origin_mm[1]), rounded(volume.origin_mm[2])};
+  report["filled_share"] =
+      rounded(static_cast<double>(filled) / static_cast<double>(std::max<std::size_t>(volume.ids.size(), 1)));
+}
+
+Report describe_vdb(const fs::path& path) {
+  // OpenVDB is not safe on corrupt files: one that lies in a pack is verified first.
+  const bool in_pack = fs::exists(path.parent_path() / kManifestName);
+  if (in_pack) read_verified_manifest(path.parent_path());
+  Report report;
+  describe_volume(read_id_volume(path), report);
+  report["checksum"] = in_pack ? "holds" : "none known (the file is not in a pack)";
+  return report;
+}
+
+Report describe_image(const fs::path& path) {
+  const Image image = read_exr(path);
+  Report report = {{"kind", "picture"}, {"resolution_px", {image.width, image.height}}};
+  for (const auto& [key, value] : image.metadata) report["metadata." + key] = value;
+  for (const auto& [name, channel] : image.channels) {
+    if (channel.type == ChannelType::kUint) {
+      report["channel." + name] = "UINT";
+      continue;
+    }
+    double sum = 0;
+    float low = std::numeric_limits<float>::infinity();
+    float high = -low;
+    std::size_t not_finite = 0;
+    for (const float value : channel.values) {
+      if (!std::isfinite(value)) {
+        ++not_finite;
+        continue;
+      }
+      sum += value;
+      low = std::min(low, value);
+      high = std::max(high, value);
+    }
+    const double count = static_cast<double>(channel.values.size() - not_finite);
+    report["channel." + name] =
+        fmt::format("{}  mean {:.6g}  min {:.6g}  max {:.6g}{}", channel.type == ChannelType::kHalf ? "HALF" : "FLOAT",
+                    sum / std::max(count, 1.0), low, high,
+                    not_finite > 0 ? fmt::format("  {} values not finite", not_finite) : "");
+  }
+  return report;
+}
+
+Report describe_mesh(const fs::path& path) {
+  const ObjMesh mesh = read_obj(path);
+  std::array<float, 3> low{};
+  std::array<float, 3> high{};
+  for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const float x = mesh.positions[v][axis];
+      low[axis] = v == 0 ? x : std::min(low[axis], x);
+      high[axis] = v == 0 ? x : std::max(high[axis], x);
+    }
+  }
+  Report report = {{"kind", "mesh"}, {"vertices", mesh.positions.size()}, {"triangles", mesh.triangles.size()}};
+  report["has_uv"] = !mesh.uvs.empty();
+  report["has_normals"] = !mesh.normals.empty();
+  report["box_min"] = {rounded(low[0]), rounded(low[1]), rounded(low[2])};
+  report["box_max"] = {rounded(high[0]), rounded(high[1]), rounded(high[2])};
+  return report;
+}
+
+Report describe(const fs::path& path, const CommonOptions& common) {
+  if (!fs::exists(path)) throw FileError(path.string() + ": no such file or folder");
+  if (fs::is_directory(path) || path.filename() == kManifestName) {
+    return describe_pack(fs::is_directory(path) ? path : path.parent_path());
+  }
+  const std::string extension = path.extension().string();
+  if (extension == ".toml") {
+    const TomlTable document = TomlTable::load(path);
+    return document.has("weave") ? describe_fabric(path, common) : describe_scene(document);
+  }
+  if (extension == ".safetensors") return describe_tensors(path, common);
+  if (extension == ".vdb") return describe_vdb(path);
+  if (extension == ".exr") return describe_image(path);
+  if (extension == ".obj") return describe_mesh(path);
+  throw FileError(path.string() + ": expected a pack, or a file that ends in .toml, .safetensors, .vdb, .exr or .obj");
+}
+
+void print_text(const Report& report) {
+  for (const auto& [key, value] : report.items()) {
+    std::string text = value.is_string() ? value.get<std::string>() : value.dump();
+    if (value.is_array() && !value.empty() && value[0].is_number()) {
+      text.clear();
+      for (const auto& number : value) text += (text.empty() ? "" : " x ") + number.dump();
+    }
+    std::cout << fmt::format("{:<26} {}\n", key, text);
+  }
+}
+
+}  // namespace
+
+int info_command(const fs::path& path, const CommonOptions& common) {
+  const Report report = describe(path, common);
+  if (common.json) {
+    std::cout << report.dump(2) << '\n';
+  } else {
+    print_text(report);
+  }
+  return 0;
+}
+
+}  // namespace heddle

@@ -1,0 +1,90 @@
+#include <fmt/format.h>
+
+#include <chrono>
+
+#include "formats/atomic_file.h"
+#include "pipeline/commands.h"
+#include "pipeline/job.h"
+#include "pipeline/picture_compare.h"
+#include "pipeline/scene_job.h"
+
+namespace heddle {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A picture from the cache, rendered where it is not there, and copied to `target` (with its .png and .json).
+void provide_picture(SceneJob& scene, const PictureRequest& request, const fs::path& target, Job& job) {
+  const std::string title = target.stem().string();
+  StageContext& context = job.context();
+  const std::string key = scene.picture_key(request);
+  const fs::path cached = context.cache.prepare("picture", key, ".exr");
+  StageResult result{.fabric = scene.config().name, .stage = title, .key = key, .artifact = cached};
+  if (!fs::exists(cached)) {
+    const auto start = std::chrono::steady_clock::now();
+    // The .exr is what says that the picture is there, so it is published last.
+    const PictureResult picture = scene.render(request, title);
+    write_picture_report(cached, picture);
+    write_exr(cached, picture.image);
+    result.built = true;
+    result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  }
+  for (const char* extension : {".exr", ".png", ".json"}) {
+    write_file_atomically(fs::path(target).replace_extension(extension),
+                          read_whole_file(fs::path(cached).replace_extension(extension)));
+  }
+  context.report(std::move(result));
+  job.add_artifact(target);
+}
+
+/// The rectangle of a full frame.
+Image cropped(const Image& full, const PixelRect& crop) {
+  Image result;
+  result.width = crop.width;
+  result.height = crop.height;
+  result.metadata = full.metadata;
+  for (const auto& [name, channel] : full.channels) {
+    ImageChannel part{channel.type, {}, {}};
+    for (int y = crop.y0; y < crop.y0 + crop.height; ++y) {
+      const auto row = static_cast<std::ptrdiff_t>(y) * full.width + crop.x0;
+      const auto copy = [&](const auto& from, auto& to) {
+        if (!from.empty()) to.insert(to.end(), from.begin() + row, from.begin() + row + crop.width);
+      };
+      copy(channel.values, part.values);
+      copy(channel.ids, part.ids);
+    }
+    result.channels[name] = std::move(part);
+  }
+  return result;
+}
+
+}  // namespace
+
+int run_command(const RunOptions& options, const CommonOptions& common) {
+  Job job(common);
+  SceneJob scene(options.scene, job.context(), options.order);
+  const fs::path folder = options.output.empty() ? fs::path("out") / options.scene.stem() : options.output;
+  make_folder(folder);
+
+  for (const ViewConfig& view : scene.config().views) {
+    const std::string name = view.name.empty() ? options.scene.stem().string() : view.name;
+    const fs::path picture = folder / (name + ".exr");
+    provide_picture(scene, scene.request(view), picture, job);
+    if (!view.reference) continue;
+    const fs::path reference = folder / (name + "-reference.exr");
+    provide_picture(scene, scene.reference_request(view), reference, job);
+
+    const fs::path difference = folder / (name + "-difference.exr");
+    const PictureComparison comparison =
+        compare_images(cropped(read_exr(picture), view.reference->crop), picture.filename().string(), read_exr(reference),
+                       reference.filename().string(), "");
+    write_difference(difference, comparison);
+    write_file_atomically(fs::path(difference).replace_extension(".json"), comparison_report(comparison).dump(2) + "\n");
+    job.console().say(fmt::format("{}: {}", name, comparison_text(comparison)));
+    job.add_artifact(difference);
+  }
+  job.finish();
+  return 0;
+}
+
+}  // namespace heddle

@@ -1,0 +1,79 @@
+#ifndef HEDDLE_PIPELINE_COMMANDS_H_
+#define HEDDLE_PIPELINE_COMMANDS_H_
+// What the subcommands do, apart from the parsing of their options (main.cpp). Each returns the exit status: 0 done,
+// 1 beyond a limit that was asked for. Failures are exceptions: ConfigError (2), FileError (1), Interrupted (128 + signal).
+// Data goes to standard output, messages and progress to standard error. Tested in tests/pipeline/end_to_end_test.cpp.
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pipeline/stages.h"
+
+namespace heddle {
+
+struct CommonOptions {
+  std::filesystem::path cache;
+  std::optional<std::uint64_t> seed;  // in place of the config's
+  bool quiet = false;
+  bool json = false;  // a report for programs on standard output
+};
+
+enum class StageTarget { kSynth, kVisibility, kTransfer, kPack };
+
+struct StageOptions {
+  std::filesystem::path fabric;
+  StageTarget target = StageTarget::kPack;
+  std::optional<int> order;
+  std::optional<Shard> shard;                      // visibility and transfer
+  std::optional<std::filesystem::path> output;     // pack: a copy outside the cache
+};
+/// Prints the path of the artifact.
+int stage_command(const StageOptions& options, const CommonOptions& common);
+
+struct RunOptions {
+  std::filesystem::path scene;
+  std::filesystem::path output;  // folder; out/SCENE where empty
+  std::optional<int> order;
+};
+/// For every view of the scene, in `output`: NAME.exr, NAME.png and NAME.json, and where the view asks for a reference
+/// NAME.reference.* (path-traced) and NAME.difference.* of a crop. Pictures are cached like artifacts of stages.
+int run_command(const RunOptions& options, const CommonOptions& common);
+
+struct RenderOptions {
+  std::filesystem::path scene;
+  std::filesystem::path output;
+  std::string view;
+  std::string method;              // the scene's where empty
+  std::optional<int> spp;
+  std::optional<double> seconds;   // the path tracer's time
+  std::vector<int> crop;           // x0, y0, x1, y1, or empty
+  bool local = false;
+  std::optional<int> bounces;
+  std::string estimator;           // "mis" where empty
+  std::optional<int> order;
+};
+int render_command(const RenderOptions& options, const CommonOptions& common);
+
+struct CompareOptions {
+  std::filesystem::path a;
+  std::filesystem::path b;
+  std::optional<std::filesystem::path> output;
+  std::string layer;               // the beauty where empty
+  std::optional<double> max_rmse;
+  std::optional<double> max_mean;
+};
+/// Status 1 where a limit is exceeded; ConfigError (2) where the pictures cannot be compared.
+int compare_command(const CompareOptions& options, const CommonOptions& common);
+
+/// Prints what a file holds.
+int info_command(const std::filesystem::path& path, const CommonOptions& common);
+
+/// Throws FileError with the first check that fails.
+int check_command(const std::filesystem::path& pack, const CommonOptions& common);
+
+}  // namespace heddle
+
+#endif  // HEDDLE_PIPELINE_COMMANDS_H_

@@ -1,0 +1,202 @@
+// The program `heddle`: its subcommands, their options, and what an error becomes (message on standard error, exit status).
+
+#include <tbb/global_control.h>
+
+#include <CLI/CLI.hpp>
+#include <charconv>
+#include <functional>
+#include <iostream>
+#include <map>
+#include <memory>
+
+#include "formats/input_error.h"
+#include "pipeline/cache.h"
+#include "pipeline/commands.h"
+#include "pipeline/eval/eval.h"
+#include "pipeline/interrupt.h"
+#include "pipeline/version.h"
+
+namespace heddle {
+namespace {
+
+constexpr int kFailed = 1;
+constexpr int kWrongUsage = 2;
+
+/// "i/n", counted from 1.
+Shard parse_shard(const std::string& text) {
+  Shard shard;
+  const std::size_t slash = text.find('/');
+  if (slash != std::string::npos) {
+    const char* middle = text.data() + slash;
+    const char* end = text.data() + text.size();
+    const auto index = std::from_chars(text.data(), middle, shard.index);
+    const auto count = std::from_chars(middle + 1, end, shard.count);
+    if (index.ec == std::errc{} && index.ptr == middle && count.ec == std::errc{} && count.ptr == end &&
+        shard.index >= 1 && shard.index <= shard.count) {
+      --shard.index;
+      return shard;
+    }
+  }
+  throw ConfigError("--shard: expected i/n with 1 <= i <= n, for example 1/4; got \"" + text + "\"");
+}
+
+/// The options of all subcommands; each subcommand offers those that mean something to it.
+struct Options {
+  CommonOptions common;
+  int threads = 0;
+  StageOptions stage;
+  std::string shard;
+  std::filesystem::path path;
+  RenderOptions render;
+  CompareOptions compare;
+  RunOptions run;
+};
+
+void add_common(CLI::App& command, Options& options) {
+  command.add_option("-j,--threads,--nthreads", options.threads, "Threads; all cores where absent")
+      ->check(CLI::Range(1, 4096));
+  command.add_flag("-q,--quiet", options.common.quiet, "No messages but warnings and errors");
+  command.add_flag("--json", options.common.json, "A report for programs on standard output");
+}
+
+void add_building(CLI::App& command, Options& options) {
+  add_common(command, options);
+  command.add_option("--cache", options.common.cache, "Folder of the artifacts; $HEDDLE_CACHE or out/cache where absent");
+  command.add_option("--seed", options.common.seed, "In place of the seed that the config states");
+}
+
+void add_order(CLI::App& command, std::optional<int>& order) {
+  command.add_option("--order", order, "Highest SH band of the transfer, in place of the fabric's")->check(CLI::Range(0, 5));
+}
+
+void add_stage_command(CLI::App& app, Options& options, const std::string& name, const std::string& help, StageTarget target,
+                       bool with_shard) {
+  CLI::App* command = app.add_subcommand(name, help);
+  add_building(*command, options);
+  command->add_option("FABRIC.toml", options.stage.fabric, "Fabric config")->required();
+  if (target == StageTarget::kTransfer || target == StageTarget::kPack) add_order(*command, options.stage.order);
+  if (target == StageTarget::kPack) {
+    command->add_option("-o,--output,--outfile", options.stage.output, "Folder for a copy of the pack outside the cache");
+  }
+  if (with_shard) {
+    command->add_option("--shard", options.shard, "i/n: compute only every n-th chunk, leave it in the cache, publish nothing");
+  }
+  command->callback([&options, target] { options.stage.target = target; });
+}
+
+/// Declares all subcommands and returns what each of them does.
+std::map<std::string, std::function<int()>> add_commands(CLI::App& app, Options& options) {
+  std::map<std::string, std::function<int()>> actions;
+
+  CLI::App* run = app.add_subcommand("run", "Build everything a scene lacks, then its pictures: the main job");
+  add_building(*run, options);
+  run->add_option("SCENE.toml", options.run.scene, "Scene config")->required();
+  run->add_option("-o,--output,--outfile", options.run.output, "Folder of the pictures; out/NAME where absent");
+  add_order(*run, options.run.order);
+  actions["run"] = [&options] { return run_command(options.run, options.common); };
+
+  add_stage_command(app, options, "precompute", "All stages of a fabric up to its pack", StageTarget::kPack, false);
+  add_stage_command(app, options, "synth", "Fibers of a fabric", StageTarget::kSynth, false);
+  add_stage_command(app, options, "visibility", "Visibility of every segment", StageTarget::kVisibility, true);
+  add_stage_command(app, options, "transfer", "Indirect light transfer of every cell", StageTarget::kTransfer, true);
+  add_stage_command(app, options, "pack", "The folder that a renderer opens", StageTarget::kPack, false);
+  for (const char* name : {"precompute", "synth", "visibility", "transfer", "pack"}) {
+    actions[name] = [&options] {
+      if (!options.shard.empty()) options.stage.shard = parse_shard(options.shard);
+      return stage_command(options.stage, options.common);
+    };
+  }
+
+  CLI::App* render = app.add_subcommand("render", "One picture of a scene");
+  RenderOptions& picture = options.render;
+  add_building(*render, options);
+  render->add_option("SCENE.toml", picture.scene, "Scene config")->required();
+  render->add_option("-o,--output,--outfile", picture.output, "The .exr file; a .png and a .json go beside it")->required();
+  render->add_option("--view", picture.view, "Name of one of the scene's [[view]] tables; its [camera] where absent");
+  render->add_option("--method", picture.method, "In place of the scene's")->check(CLI::IsMember({"exact", "volume", "path"}));
+  render->add_option("--spp", picture.spp, "Samples per pixel, in place of the scene's")->check(CLI::Range(1, 1 << 24));
+  render->add_option("--seconds", picture.seconds, "Path tracer: go on until this much time is spent")
+      ->check(CLI::PositiveNumber);
+  render->add_option("--crop,--cropwindow", picture.crop, "x0,y0,x1,y1 in pixels, x1 and y1 excluded")
+      ->delimiter(',')
+      ->expected(4);
+  render->add_flag("--local", picture.local, "Path tracer: paths that leave the cloth's shell end");
+  render->add_option("--bounces", picture.bounces, "Path tracer: scattering events, no limit where absent")
+      ->check(CLI::Range(1, 4096));
+  render->add_option("--estimator", picture.estimator, "Path tracer: how lights are sampled")
+      ->check(CLI::IsMember({"mis", "light", "bcsdf"}));
+  add_order(*render, picture.order);
+  actions["render"] = [&options] { return render_command(options.render, options.common); };
+
+  CLI::App* evaluate = app.add_subcommand("eval", "JSON lines in, JSON lines out: any scattering model or basis function");
+  evaluate->footer("Quantities and their fields: docs/eval.md");
+  actions["eval"] = [] { return run_eval(std::cin, std::cout); };
+
+  CLI::App* compare = app.add_subcommand("compare", "Error metrics of picture A against the reference B");
+  CompareOptions& pair = options.compare;
+  add_common(*compare, options);
+  compare->add_option("A.exr", pair.a, "Picture")->required();
+  compare->add_option("B.exr", pair.b, "Reference")->required();
+  compare->add_option("-o,--output,--outfile", pair.output, "Difference picture: an .exr, and a .png beside it");
+  compare->add_option("--layer", pair.layer, "Layer to compare, such as single; the beauty where absent");
+  compare->add_option("--max-rmse", pair.max_rmse, "Status 1 where the relative RMSE is larger")->check(CLI::NonNegativeNumber);
+  compare->add_option("--max-mean", pair.max_mean, "Status 1 where the mean colour is off by a larger share")
+      ->check(CLI::NonNegativeNumber);
+  actions["compare"] = [&options] { return compare_command(options.compare, options.common); };
+
+  CLI::App* info = app.add_subcommand("info", "What a file holds: any of ours, or any that we read");
+  add_common(*info, options);
+  info->add_option("--seed", options.common.seed, "In place of the seed that the config states");
+  info->add_option("PATH", options.path, "Fabric or scene .toml, pack, .safetensors, .vdb, .exr, .obj")->required();
+  actions["info"] = [&options] { return info_command(options.path, options.common); };
+
+  CLI::App* check = app.add_subcommand("check", "Checksums, versions, finite values and ranges of a pack");
+  add_common(*check, options);
+  check->add_option("PACK", options.path, "Folder with a manifest.json")->required();
+  actions["check"] = [&options] { return check_command(options.path, options.common); };
+  return actions;
+}
+
+int main_program(int argc, char** argv) {
+  CLI::App app{"Heddle: from a fabric description to pictures of cloth, down to single fibers"};
+  app.set_version_flag("--version", std::string("heddle ") + kProgramVersion);
+  app.require_subcommand(1);
+  Options options;
+  const auto actions = add_commands(app, options);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
+    std::cerr << "heddle: " << error.what() << "\nRun with --help for the options.\n";
+    return kWrongUsage;
+  }
+  if (options.common.cache.empty()) options.common.cache = default_cache_folder();
+  std::unique_ptr<tbb::global_control> limit;
+  if (options.threads > 0) {
+    limit = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism,
+                                                  static_cast<std::size_t>(options.threads));
+  }
+  install_interrupt_handler();
+  const int status = actions.at(app.get_subcommands().front()->get_name())();
+  std::cout.flush();
+  if (!std::cout) throw FileError("standard output: cannot be written");
+  return status;
+}
+
+}  // namespace
+}  // namespace heddle
+
+int main(int argc, char** argv) {
+  try {
+    return heddle::main_program(argc, argv);
+  } catch (const heddle::Interrupted& interrupted) {
+    std::cerr << "heddle: " << interrupted.what() << '\n';
+    return interrupted.exit_status();
+  } catch (const heddle::ConfigError& error) {
+    std::cerr << "heddle: " << error.what() << '\n';
+    return heddle::kWrongUsage;
+  } catch (const std::exception& error) {
+    std::cerr << "heddle: " << error.what() << '\n';
+    return heddle::kFailed;
+  }
+}

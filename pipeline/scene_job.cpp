@@ -1,0 +1,202 @@
+#include "pipeline/scene_job.h"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cmath>
+
+#include "formats/atomic_file.h"
+#include "formats/content_hash.h"
+#include "formats/input_error.h"
+#include "pipeline/interrupt.h"
+#include "pipeline/scene_needs.h"
+#include "pipeline/version.h"
+#include "render/cloth_scene.h"
+#include "render/precomputed_renderer.h"
+#include "render/render_output.h"
+#include "render/tone_map.h"
+
+namespace heddle {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+// Version of what all render methods compute; part of every picture's key.
+constexpr int kPictureVersion = 1;
+
+std::string camera_text(const CameraConfig& camera) {
+  const auto list = [](const Vec3d& v) { return fmt::format("{},{},{}", v.x(), v.y(), v.z()); };
+  return fmt::format("position {} look_at {} up {} fov {} {} {}x{}", list(camera.position), list(camera.look_at),
+                     list(camera.up), camera.fov, camera.fov_axis == FovAxis::kHorizontal ? "horizontal" : "vertical",
+                     camera.width, camera.height);
+}
+
+std::string crop_text(const PixelRect& crop) {
+  return fmt::format("{},{},{},{}", crop.x0, crop.y0, crop.x0 + crop.width, crop.y0 + crop.height);
+}
+
+const char* estimator_name(LightEstimator estimator) {
+  switch (estimator) {
+    case LightEstimator::kCombined: return "mis";
+    case LightEstimator::kShadowRays: return "light";
+    case LightEstimator::kEscapes: return "bcsdf";
+  }
+  return "";
+}
+
+PathTracerSettings path_tracer_settings(const PictureRequest& request) {
+  PathTracerSettings settings;
+  settings.seed = request.seed;
+  settings.local = request.local;
+  settings.estimator = request.estimator;
+  if (request.bounces) settings.limits.max_scatterings = *request.bounces;
+  return settings;
+}
+
+}  // namespace
+
+/// Packs and geometry of a scene for one method.
+struct SceneJob::Loaded {
+  std::map<fs::path, FabricPack> packs;  // by fabric file
+  std::map<fs::path, std::shared_ptr<const TileScene>> tiles;
+  std::unique_ptr<ClothScene> scene;
+};
+
+SceneJob::SceneJob(const fs::path& scene_file, StageContext& context, std::optional<int> order)
+    : context_(&context), order_(order) {
+  const TomlTable document = TomlTable::load(scene_file);
+  config_ = read_scene_config(document);
+  auto text = nlohmann::json::parse(document.canonical_text());
+  for (const char* key : {"name", "camera", "view", "render"}) text.erase(key);
+  scene_text_ = text.dump();
+  for (const ClothConfig& cloth : config_.cloths) {
+    auto& stages = fabrics_[cloth.fabric];
+    if (!stages) stages = std::make_unique<FabricStages>(cloth.fabric, context);
+  }
+}
+
+SceneJob::~SceneJob() = default;
+
+PictureRequest SceneJob::request(const ViewConfig& view) const {
+  PictureRequest request;
+  request.camera = view.camera;
+  request.crop = {0, 0, view.camera.width, view.camera.height};
+  request.method = config_.method;
+  request.spp = view.spp;
+  request.seed = context_->seed.value_or(config_.seed);
+  return request;
+}
+
+PictureRequest SceneJob::reference_request(const ViewConfig& view) const {
+  PictureRequest reference = request(view);
+  reference.method = RenderMethod::kPath;
+  reference.crop = view.reference->crop;
+  reference.spp = view.reference->spp;
+  reference.local = view.reference->local;
+  return reference;
+}
+
+std::vector<Artifact> SceneJob::packs_for(RenderMethod method) {
+  Needs needs = needs_of(method, config_.lights);
+  needs.order = order_;
+  std::vector<Artifact> packs;
+  for (auto& [file, stages] : fabrics_) packs.push_back(stages->pack(needs));
+  return packs;
+}
+
+std::string SceneJob::picture_key(const PictureRequest& request) {
+  StageInputs inputs{"picture", kPictureVersion, {{"scene", scene_text_}, {"camera", camera_text(request.camera)}}};
+  auto& values = inputs.values;
+  values.emplace_back("method", render_method_name(request.method));
+  values.emplace_back("crop", crop_text(request.crop));
+  values.emplace_back("sampling", fmt::format("spp {} seed {}", request.spp, request.seed));
+  values.emplace_back("paths", fmt::format("local {} bounces {} estimator {}", request.local, request.bounces.value_or(0),
+                                           estimator_name(request.estimator)));
+  values.emplace_back("shadow_sigma_mm", config_.shadow_sigma_mm ? fmt::format("{}", *config_.shadow_sigma_mm) : "");
+  for (const Artifact& pack : packs_for(request.method)) values.emplace_back("pack", pack.key);
+  for (const ClothConfig& cloth : config_.cloths) {
+    if (cloth.mesh) values.emplace_back("mesh", content_hash_of_file(cloth.mesh->path));
+  }
+  for (const MeshFile& mesh : config_.meshes) values.emplace_back("mesh", content_hash_of_file(mesh.path));
+  return stage_key(inputs);
+}
+
+const SceneJob::Loaded& SceneJob::loaded_for(RenderMethod method) {
+  std::unique_ptr<Loaded>& loaded = loaded_[method];
+  if (loaded) return *loaded;
+  loaded = std::make_unique<Loaded>();
+  const std::vector<Artifact> artifacts = packs_for(method);
+  std::size_t k = 0;
+  for (const auto& [file, stages] : fabrics_) {
+    loaded->packs.emplace(file, load_pack(artifacts[k++].path));
+    loaded->tiles[file] = std::make_shared<const TileScene>(loaded->packs.at(file).exemplar);
+  }
+  std::vector<std::shared_ptr<const TileScene>> tiles;
+  for (const ClothConfig& cloth : config_.cloths) tiles.push_back(loaded->tiles.at(cloth.fabric));
+  loaded->scene.reset(new ClothScene(make_cloth_scene(config_, tiles)));  // cannot be moved: built in place
+  return *loaded;
+}
+
+PictureResult SceneJob::render(const PictureRequest& request, const std::string& title) {
+  const std::string key = picture_key(request);
+  const Loaded& loaded = loaded_for(request.method);
+  const Camera camera(request.camera);
+  const auto start = std::chrono::steady_clock::now();
+
+  // Progress in samples, or in seconds where those are the budget.
+  const auto pixels = static_cast<std::uint64_t>(request.crop.width) * static_cast<std::uint64_t>(request.crop.height);
+  const std::uint64_t total = request.seconds ? static_cast<std::uint64_t>(std::ceil(*request.seconds))
+                                              : pixels * static_cast<std::uint64_t>(request.spp);
+  Progress progress(*context_->console, title, request.seconds ? "seconds" : "samples", total);
+  std::uint64_t shown = 0;
+  const RenderProgress report_progress = [&](double share) {
+    stop_if_interrupted();
+    const auto now = static_cast<std::uint64_t>(std::min(share, 1.0) * static_cast<double>(total));
+    progress.advance(now - shown);
+    shown = now;
+  };
+
+  FrameBuffers frame;
+  if (request.method == RenderMethod::kPath) {
+    const std::vector<BcsdfTable> materials = scene_materials(*loaded.scene);
+    const PathTracer tracer(*loaded.scene, materials, config_.lights, config_.background, path_tracer_settings(request));
+    frame = trace_picture(tracer, camera, request.crop, request.seed, {request.spp, request.seconds}, report_progress);
+  } else {
+    std::vector<const FabricPack*> packs;
+    for (const ClothConfig& cloth : config_.cloths) packs.push_back(&loaded.packs.at(cloth.fabric));
+    const PrecomputedSettings settings{.seed = request.seed,
+                                       .volume = request.method == RenderMethod::kVolume,
+                                       .shadow_sigma_mm = config_.shadow_sigma_mm};
+    const PrecomputedRenderer renderer(*loaded.scene, packs, config_.lights, config_.background, settings);
+    frame = shade_picture(renderer, camera, request.crop, request.spp, report_progress);
+  }
+
+  PictureResult result;
+  const std::map<std::string, std::string> metadata = {
+      {"software", std::string("heddle ") + kProgramVersion},
+      {"heddle.scene", config_.name},
+      {"heddle.method", render_method_name(request.method)},
+      {"heddle.key", key},
+      {"heddle.seed", fmt::format("{}", request.seed)},
+      {"heddle.spp", fmt::format("{}", frame.spp)},
+      {"heddle.crop", crop_text(request.crop)},
+      {"heddle.local", request.local ? "true" : "false"},
+      {"heddle.worldToCamera", camera.world_to_camera_text()},
+  };
+  result.image = image_of(frame, metadata);
+  for (const auto& [name, value] : metadata) result.report[name] = value;
+  result.report["seconds"] = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  result.report["failed_shell_walks"] = loaded.scene->failed_walks();
+  result.report["flipped_tetrahedra"] = loaded.scene->flipped_tets();
+  result.report["degenerate_tetrahedra"] = loaded.scene->degenerate_tets();
+  return result;
+}
+
+void write_picture_report(const fs::path& exr, const PictureResult& picture) {
+  write_png(fs::path(exr).replace_extension(".png"), picture.image.width, picture.image.height,
+            tone_map(layer_of(picture.image, "", exr.string()), 0));
+  write_file_atomically(fs::path(exr).replace_extension(".json"), picture.report.dump(2) + "\n");
+}
+
+}  // namespace heddle

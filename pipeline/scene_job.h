@@ -1,0 +1,76 @@
+#ifndef HEDDLE_PIPELINE_SCENE_JOB_H_
+#define HEDDLE_PIPELINE_SCENE_JOB_H_
+// From a scene file to pictures: finds out what a picture needs, has the stages of its fabrics build what is missing, loads
+// packs and meshes once, renders. Tested in tests/pipeline/end_to_end_test.cpp.
+
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "fibers/baked/fabric_pack.h"
+#include "formats/image_file.h"
+#include "pipeline/stages.h"
+#include "render/path_tracer.h"
+#include "render/scene_config.h"
+
+namespace heddle {
+
+/// One picture of a scene.
+struct PictureRequest {
+  CameraConfig camera;
+  PixelRect crop;
+  RenderMethod method = RenderMethod::kExact;
+  int spp = 1;
+  std::uint64_t seed = 1;
+  // Path tracer only.
+  std::optional<double> seconds;
+  bool local = false;
+  std::optional<int> bounces;
+  LightEstimator estimator = LightEstimator::kCombined;
+};
+
+/// A picture and what is worth knowing of its making.
+struct PictureResult {
+  Image image;
+  nlohmann::ordered_json report;
+};
+
+class SceneJob {
+ public:
+  /// `context` outlives the object. order: of the transfer, the fabric's where empty.
+  SceneJob(const std::filesystem::path& scene_file, StageContext& context, std::optional<int> order);
+  ~SceneJob();
+
+  const SceneConfig& config() const { return config_; }
+  /// The picture that a view of the scene asks for.
+  PictureRequest request(const ViewConfig& view) const;
+  /// The path-traced crop that goes with it.
+  PictureRequest reference_request(const ViewConfig& view) const;
+
+  /// Builds what the picture needs; equal keys, equal pictures.
+  std::string picture_key(const PictureRequest& request);
+  PictureResult render(const PictureRequest& request, const std::string& title);
+
+ private:
+  struct Loaded;
+  std::vector<Artifact> packs_for(RenderMethod method);
+  const Loaded& loaded_for(RenderMethod method);
+
+  SceneConfig config_;
+  std::string scene_text_;  // canonical text of what all pictures of the scene depend on
+  StageContext* context_;
+  std::optional<int> order_;
+  std::map<std::filesystem::path, std::unique_ptr<FabricStages>> fabrics_;
+  std::map<RenderMethod, std::unique_ptr<Loaded>> loaded_;
+};
+
+/// Beside PATH.exr: a tone-mapped PATH.png and the report as PATH.json.
+void write_picture_report(const std::filesystem::path& exr, const PictureResult& picture);
+
+}  // namespace heddle
+
+#endif  // HEDDLE_PIPELINE_SCENE_JOB_H_

@@ -1,0 +1,408 @@
+#include "pipeline/stages.h"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "fibers/baked/fabric_pack.h"
+#include "fibers/cloth/synthesize.h"
+#include "fibers/tracing/tile_scene.h"
+#include "formats/atomic_file.h"
+#include "formats/content_hash.h"
+#include "formats/id_volume_file.h"
+#include "formats/input_error.h"
+#include "formats/tensor_file.h"
+#include "pipeline/interrupt.h"
+#include "pipeline/version.h"
+#include "precompute/sg_fit.h"
+#include "precompute/ssdf_fit.h"
+#include "precompute/visibility_maps.h"
+
+namespace heddle {
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+// Segments per visibility chunk and cells per transfer chunk: a few seconds of two cores, so that little is lost when a
+// job is killed, and enough work for many threads.
+constexpr std::uint32_t kSegmentsPerChunk = 256;
+constexpr std::uint32_t kCellsPerChunk = 32;
+
+void write_transfer_chunk(const fs::path& path, const TransferChunk& chunk, int order) {
+  const auto cells = static_cast<std::uint64_t>(chunk.paths.size());
+  const auto bands = static_cast<std::uint64_t>(order + 1);
+  TensorFileWriter writer;
+  writer.add<float>("matrices", {cells, bands * bands, bands * bands, 3}, chunk.matrices);
+  writer.add<float>("standard_error", {cells, bands, 3}, chunk.standard_error);
+  writer.add<std::uint32_t>("paths", {cells}, chunk.paths);
+  writer.write(path);
+}
+
+TransferChunk read_transfer_chunk(const fs::path& path, std::uint32_t first_cell, std::uint64_t cells, int order) {
+  const auto bands = static_cast<std::uint64_t>(order + 1);
+  const TensorFile file = TensorFile::read(path);
+  TransferChunk chunk;
+  chunk.first_cell = first_cell;
+  chunk.matrices = file.get<float>("matrices", {cells, bands * bands, bands * bands, 3});
+  chunk.standard_error = file.get<float>("standard_error", {cells, bands, 3});
+  chunk.paths = file.get<std::uint32_t>("paths", {cells});
+  return chunk;
+}
+
+std::string hash_of_geometry(const Exemplar& exemplar) {
+  const auto bytes_of = [](const auto& values) { return content_hash(std::as_bytes(std::span(values))); };
+  return stage_key({"geometry",
+                    1,
+                    {{"tile_mm", fmt::format("{} {}", exemplar.width_mm, exemplar.height_mm)},
+                     {"first_point", bytes_of(exemplar.first_point)},
+                     {"points", bytes_of(exemplar.points)},
+                     {"radius_mm", bytes_of(exemplar.radius_mm)}}});
+}
+
+}  // namespace
+
+FabricDocument read_fabric_document(const fs::path& path, std::optional<std::uint64_t> seed) {
+  const TomlTable document = TomlTable::load(path);
+  FabricDocument fabric;
+  fabric.file = path;
+  fabric.config = read_fabric_config(document);
+  if (seed) fabric.config.seed = *seed;
+  fabric.visibility = read_visibility_settings(document.table("visibility"), fabric.config.light_from_both_sides);
+  fabric.visibility.seed = fabric.config.seed;
+  fabric.transfer = read_transfer_settings(document.table("transfer"));
+  fabric.transfer.both_sides = fabric.config.light_from_both_sides;
+  fabric.transfer.seed = fabric.config.seed;
+  fabric.volume = read_volume_settings(document.table("volume"));
+  document.finish();
+
+  // canonical_text() is JSON. The cloth depends on everything but what is taken out here.
+  auto cloth = nlohmann::json::parse(document.canonical_text());
+  auto transfer = cloth.at("transfer");
+  transfer.erase("order");
+  fabric.visibility_text = cloth.at("visibility").dump();
+  fabric.transfer_text = transfer.dump();
+  fabric.volume_text = cloth.at("volume").dump();
+  for (const char* key : {"name", "light_from", "visibility", "transfer", "volume"}) cloth.erase(key);
+  cloth["seed"] = fabric.config.seed;
+  fabric.cloth_text = cloth.dump();
+  return fabric;
+}
+
+/// One stage of one fabric: where its artifact lies, and what the artifact says of its origin.
+struct FabricStages::Stage {
+  std::string name;
+  std::string extension;
+  std::string key;
+  std::map<std::string, std::string> metadata;
+};
+
+FabricStages::FabricStages(const fs::path& fabric_file, StageContext& context)
+    : document_(read_fabric_document(fabric_file, context.seed)), context_(&context) {}
+
+FabricStages::~FabricStages() = default;
+
+FabricStages::Stage FabricStages::make_stage(std::string name, int version, std::string extension,
+                                             const std::string& config,
+                                             std::vector<std::pair<std::string, std::string>> upstream) const {
+  upstream.emplace_back("config", config);
+  Stage stage;
+  stage.key = stage_key({name, version, std::move(upstream)});
+  stage.metadata = {{"stage", name}, {"key", stage.key}, {"config", config}, {"program_version", kProgramVersion}};
+  stage.name = std::move(name);
+  stage.extension = std::move(extension);
+  return stage;
+}
+
+void StageContext::report(StageResult result) {
+  for (const StageResult& earlier : results) {
+    if (earlier.stage == result.stage && earlier.key == result.key) return;
+  }
+  std::string how = result.built ? fmt::format("built in {}", duration_text(result.seconds)) : "cached";
+  if (result.resumed > 0) how += fmt::format(", {} chunks were already done", result.resumed);
+  console->say(fmt::format("{}: {:<9} {}", result.fabric, result.stage, how));
+  results.push_back(std::move(result));
+}
+
+/// build(path, result) writes the artifact, atomically, where the cache lacks it.
+template <class Build>
+Artifact FabricStages::artifact_of(const Stage& stage, Build&& build) {
+  const Artifact artifact{stage.key, context_->cache.artifact(stage.name, stage.key, stage.extension)};
+  StageResult result{.fabric = document_.config.name, .stage = stage.name, .key = stage.key, .artifact = artifact.path};
+  if (!fs::exists(artifact.path)) {
+    stop_if_interrupted();
+    const Clock::time_point start = Clock::now();
+    context_->cache.prepare(stage.name, stage.key, stage.extension);
+    build(artifact.path, result);
+    result.built = true;
+    result.seconds = std::chrono::duration<double>(Clock::now() - start).count();
+  }
+  context_->report(std::move(result));
+  return artifact;
+}
+
+const Exemplar& FabricStages::exemplar() {
+  if (!exemplar_) exemplar_ = read_exemplar(synth().path);
+  return *exemplar_;
+}
+
+const TileScene& FabricStages::scene() {
+  if (!scene_) scene_ = std::make_unique<TileScene>(exemplar());
+  return *scene_;
+}
+
+const SegmentOrigins& FabricStages::origins() {
+  if (!origins_) {
+    origins_ = find_segment_origins(scene(), document_.config.light_from_both_sides, OriginChoice::kExposed,
+                                    document_.config.seed);
+  }
+  return *origins_;
+}
+
+const std::string& FabricStages::geometry_key() {
+  if (geometry_key_.empty()) geometry_key_ = hash_of_geometry(exemplar());
+  return geometry_key_;
+}
+
+Artifact FabricStages::synth() {
+  const Stage stage = make_stage("synth", 1, ".safetensors", document_.cloth_text, {});
+  return artifact_of(stage, [&](const fs::path& path, StageResult&) {
+    try {
+      write_exemplar(path, synthesize(document_.config), stage.metadata);
+    } catch (const std::invalid_argument& error) {
+      throw ConfigError(fmt::format("{}: {}", document_.file.string(), error.what()));
+    }
+  });
+}
+
+template <class Compute>
+void FabricStages::finish_chunks(const Stage& stage, std::uint32_t items, std::uint32_t per_chunk, const std::string& unit,
+                                 Shard shard, StageResult& result, Compute&& compute) {
+  const PartialChunks chunks(context_->cache, stage.name, stage.key);
+  std::vector<std::uint32_t> missing;
+  std::uint64_t items_of_shard = 0;
+  std::uint64_t items_done = 0;
+  for (std::uint32_t first = 0; first < items; first += per_chunk) {
+    if (first / per_chunk % shard.count != shard.index) continue;
+    const std::uint32_t size = std::min(per_chunk, items - first);
+    items_of_shard += size;
+    if (chunks.has(first)) {
+      ++result.resumed;
+      items_done += size;
+    } else {
+      missing.push_back(first);
+    }
+  }
+  Progress progress(*context_->console, stage.name, unit, items_of_shard, items_done);
+  for (const std::uint32_t first : missing) {
+    stop_if_interrupted();
+    const std::uint32_t size = std::min(per_chunk, items - first);
+    compute(chunks.prepare(first), first, first + size);
+    ++result.chunks;
+    progress.advance(size);
+  }
+}
+
+/// read(file, first, end) for all chunks in order; a chunk that cannot be read is computed again.
+template <class Compute, class Read>
+void FabricStages::read_chunks(const Stage& stage, std::uint32_t items, std::uint32_t per_chunk, Compute&& compute,
+                               Read&& read) {
+  const PartialChunks chunks(context_->cache, stage.name, stage.key);
+  for (std::uint32_t first = 0; first < items; first += per_chunk) {
+    const std::uint32_t end = std::min(first + per_chunk, items);
+    const fs::path file = chunks.file(first);
+    try {
+      read(file, first, end);
+    } catch (const FileError& error) {
+      context_->console->warn(fmt::format("{}; computing this chunk again", error.what()));
+      compute(file, first, end);
+      read(file, first, end);
+    }
+  }
+}
+
+/// A shard's own line in the report; nothing is published.
+template <class Work>
+void FabricStages::run_shard(const Stage& stage, Work&& work) {
+  StageResult result{.fabric = document_.config.name, .stage = stage.name, .key = stage.key,
+                     .artifact = context_->cache.artifact(stage.name, stage.key, stage.extension)};
+  if (!fs::exists(result.artifact)) {
+    const Clock::time_point start = Clock::now();
+    work(result);
+    result.built = result.chunks > 0;
+    result.seconds = std::chrono::duration<double>(Clock::now() - start).count();
+  }
+  context_->report(std::move(result));
+}
+
+// Maps do not depend on [visibility], which says how they are compressed.
+FabricStages::Stage FabricStages::maps_stage() {
+  return make_stage("maps", 1, ".safetensors", "",
+                    {{"geometry", geometry_key()},
+                     {"light_from", light_from()},
+                     {"seed", fmt::format("{}", document_.config.seed)}});
+}
+
+/// Computes one chunk of maps.
+void FabricStages::compute_maps(const Stage& stage, const fs::path& file, std::uint32_t first, std::uint32_t end) {
+  write_visibility_maps(file, bake_visibility_maps(scene(), origins(), document_.config.light_from_both_sides, first, end),
+                        stage.metadata);
+}
+
+Artifact FabricStages::maps() {
+  const Stage stage = maps_stage();
+  return artifact_of(stage, [&](const fs::path& path, StageResult& result) {
+    const auto segments = static_cast<std::uint32_t>(exemplar().segment_count());
+    const auto compute = [&](const fs::path& file, std::uint32_t first, std::uint32_t end) {
+      compute_maps(stage, file, first, end);
+    };
+    finish_chunks(stage, segments, kSegmentsPerChunk, "segments", Shard{}, result, compute);
+    VisibilityMaps all;
+    all.both_sides = document_.config.light_from_both_sides;
+    read_chunks(stage, segments, kSegmentsPerChunk, compute, [&](const fs::path& file, std::uint32_t first, std::uint32_t end) {
+      const VisibilityMaps chunk = read_visibility_maps(file);
+      if (chunk.first_segment != first || chunk.count() != end - first || chunk.both_sides != all.both_sides) {
+        throw FileError(file.string() + ": not the chunk that its name says");
+      }
+      all.append(chunk);
+    });
+    write_visibility_maps(path, all, stage.metadata);
+    PartialChunks(context_->cache, stage.name, stage.key).remove();
+  });
+}
+
+void FabricStages::visibility_shard(Shard shard) {
+  const Stage stage = maps_stage();
+  run_shard(stage, [&](StageResult& result) {
+    finish_chunks(stage, static_cast<std::uint32_t>(exemplar().segment_count()), kSegmentsPerChunk, "segments", shard, result,
+                  [&](const fs::path& file, std::uint32_t first, std::uint32_t end) { compute_maps(stage, file, first, end); });
+  });
+}
+
+FabricStages::Stage FabricStages::fit_stage(const std::string& name, int version) {
+  return make_stage(name, version, ".safetensors", document_.visibility_text,
+                    {{"maps", maps_stage().key}, {"seed", fmt::format("{}", document_.config.seed)}});
+}
+
+Artifact FabricStages::ssdf() {
+  const Stage stage = fit_stage("ssdf", 1);
+  return artifact_of(stage, [&](const fs::path& path, StageResult&) {
+    write_ssdf(path, fit_ssdf(read_visibility_maps(maps().path), document_.visibility), stage.metadata);
+  });
+}
+
+Artifact FabricStages::sgs() {
+  const Stage stage = fit_stage("sg", 1);
+  return artifact_of(stage, [&](const fs::path& path, StageResult&) {
+    write_sg_visibility(path, fit_sgs(read_visibility_maps(maps().path), document_.visibility), stage.metadata);
+  });
+}
+
+const char* FabricStages::light_from() const { return document_.config.light_from_both_sides ? "both" : "face"; }
+
+TransferSettings FabricStages::transfer_settings(std::optional<int> order) const {
+  TransferSettings settings = document_.transfer;
+  if (order) settings.order = *order;
+  return settings;
+}
+
+FabricStages::Stage FabricStages::transfer_stage(const TransferSettings& settings) {
+  return make_stage("transfer", 1, ".safetensors", document_.transfer_text,
+                    {{"fibers", synth().key},
+                     {"order", fmt::format("{}", settings.order)},
+                     {"light_from", light_from()},
+                     {"seed", fmt::format("{}", settings.seed)}});
+}
+
+/// What the transfer stage and its shards need besides the settings.
+struct FabricStages::TransferWork {
+  std::vector<BcsdfTable> materials;
+  TransferSettings settings;
+  std::optional<TransferBaker> baker;
+
+  void compute(const fs::path& file, std::uint32_t first, std::uint32_t end) const {
+    write_transfer_chunk(file, baker->bake(first, end), settings.order);
+  }
+};
+
+std::unique_ptr<FabricStages::TransferWork> FabricStages::transfer_work(const TransferSettings& settings) {
+  auto work = std::make_unique<TransferWork>();
+  for (const FiberScattering& scattering : exemplar().scattering) work->materials.emplace_back(scattering);
+  work->settings = settings;
+  const double mean_free_path = scene().mean_free_path(settings.seed, kMeanFreePathSamples);
+  const Exemplar& cloth = exemplar();
+  const CellGrid grid = make_cell_grid(cloth.width_mm, cloth.height_mm, cloth.z_min, cloth.z_max,
+                                       static_cast<float>(settings.cell_mean_free_paths * mean_free_path));
+  work->baker.emplace(scene(), work->materials, origins(), settings, grid);
+  return work;
+}
+
+Artifact FabricStages::transfer(std::optional<int> order) {
+  const TransferSettings settings = transfer_settings(order);
+  const Stage stage = transfer_stage(settings);
+  return artifact_of(stage, [&](const fs::path& path, StageResult& result) {
+    const auto work = transfer_work(settings);
+    const std::uint32_t cells = work->baker->cell_count();
+    const auto compute = [&](const fs::path& file, std::uint32_t first, std::uint32_t end) {
+      work->compute(file, first, end);
+    };
+    finish_chunks(stage, cells, kCellsPerChunk, "cells", Shard{}, result, compute);
+    std::vector<TransferChunk> chunks;
+    read_chunks(stage, cells, kCellsPerChunk, compute, [&](const fs::path& file, std::uint32_t first, std::uint32_t end) {
+      chunks.push_back(read_transfer_chunk(file, first, end - first, settings.order));
+    });
+    write_transfer(path, work->baker->assemble(chunks), stage.metadata);
+    PartialChunks(context_->cache, stage.name, stage.key).remove();
+  });
+}
+
+Artifact FabricStages::volume() {
+  const Stage stage =
+      make_stage("voxelize", 1, ".vdb", document_.volume_text, {{"geometry", geometry_key()}});
+  return artifact_of(stage, [&](const fs::path& path, StageResult&) {
+    write_id_volume(path, voxelize(exemplar(), document_.volume), stage.metadata);
+  });
+}
+
+Artifact FabricStages::pack(const Needs& needs) {
+  std::vector<std::pair<std::string, Artifact>> parts = {{"fibers.safetensors", synth()}};
+  if (needs.ssdf) parts.emplace_back("ssdf.safetensors", ssdf());
+  if (needs.sgs) parts.emplace_back("sg.safetensors", sgs());
+  if (needs.transfer) parts.emplace_back("transfer.safetensors", transfer(needs.order));
+  if (needs.volume) parts.emplace_back("volume.vdb", volume());
+
+  std::vector<std::pair<std::string, std::string>> upstream;
+  for (const auto& [file, artifact] : parts) upstream.emplace_back(file, artifact.key);
+  upstream.emplace_back("light_from", light_from());
+  const Stage stage = make_stage("pack", 1, "", document_.config.name, std::move(upstream));
+  return artifact_of(stage, [&](const fs::path&, StageResult&) {
+    context_->cache.publish_folder("pack", stage.key, [&](const fs::path& folder) {
+      PackManifest manifest;
+      manifest.name = document_.config.name;
+      manifest.key = stage.key;
+      manifest.program_version = kProgramVersion;
+      manifest.light_from_both_sides = document_.config.light_from_both_sides;
+      manifest.counts = {{"fibers", exemplar().fiber_count()}, {"segments", exemplar().segment_count()}};
+      for (const auto& [file, artifact] : parts) {
+        write_file_atomically(folder / file, read_whole_file(artifact.path));
+        manifest.files[file] = {};
+      }
+      if (needs.transfer) manifest.counts["cells"] = read_transfer(folder / "transfer.safetensors").grid.count();
+      write_manifest(folder, std::move(manifest));
+    });
+  });
+}
+
+void FabricStages::transfer_shard(std::optional<int> order, Shard shard) {
+  const TransferSettings settings = transfer_settings(order);
+  const Stage stage = transfer_stage(settings);
+  run_shard(stage, [&](StageResult& result) {
+    const auto work = transfer_work(settings);
+    finish_chunks(stage, work->baker->cell_count(), kCellsPerChunk, "cells", shard, result,
+                  [&](const fs::path& file, std::uint32_t first, std::uint32_t end) { work->compute(file, first, end); });
+  });
+}
+
+}  // namespace heddle

@@ -1,0 +1,161 @@
+#ifndef HEDDLE_PIPELINE_STAGES_H_
+#define HEDDLE_PIPELINE_STAGES_H_
+// The stages of one fabric, from its config to its pack. A stage is a pure function from (its section of the config,
+// upstream artifacts) to one artifact; a stage whose key is in the cache is not run, and nothing is built that the caller
+// does not ask for (directly or through what it asks for).
+//
+//   synth       config without the sections below           fibers.safetensors       Exemplar
+//   maps        geometry, light_from, seed  in chunks       maps.safetensors         VisibilityMaps
+//   ssdf        maps, [visibility]                          ssdf.safetensors         SsdfVisibility
+//   sg          maps, [visibility]                          sg.safetensors           SgVisibility
+//   transfer    fibers, [transfer], light_from   in chunks  transfer.safetensors     Transfer
+//   voxelize    geometry, [volume]                          volume.vdb               IdVolume
+//   pack        what the pack is to hold                    folder                   FabricPack
+//
+// "Geometry" is a hash of the fibers' shapes: a fabric that differs in its dyes only shares maps, ssdf, sg and volume.
+// A default value that changes, or an algorithm, needs a new version number of its stage (stages.cpp).
+// Errors: ConfigError, FileError, Interrupted. Tested in tests/pipeline/stages_test.cpp and end_to_end_test.cpp.
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "fibers/cloth/exemplar.h"
+#include "fibers/cloth/fabric_config.h"
+#include "fibers/tracing/segment_origins.h"
+#include "fibers/tracing/tile_scene.h"
+#include "pipeline/cache.h"
+#include "pipeline/console.h"
+#include "precompute/transfer_bake.h"
+#include "precompute/visibility_settings.h"
+#include "precompute/voxelize.h"
+
+namespace heddle {
+
+/// What a render asks of a pack; the fibers are always there.
+struct Needs {
+  bool ssdf = false;
+  bool sgs = false;
+  bool transfer = false;
+  bool volume = false;
+  std::optional<int> order;  // of the transfer; the fabric's where empty
+};
+
+inline constexpr Needs kEverything{.ssdf = true, .sgs = true, .transfer = true, .volume = true, .order = {}};
+
+/// Which of the chunks of a long stage this process does: chunk c where c % count == index.
+struct Shard {
+  std::uint32_t index = 0;
+  std::uint32_t count = 1;
+};
+
+/// One line of the job's report.
+struct StageResult {
+  std::string fabric;
+  std::string stage;
+  std::string key;
+  std::filesystem::path artifact;
+  bool built = false;          // false: found in the cache
+  std::uint64_t chunks = 0;    // finished by this process
+  std::uint64_t resumed = 0;   // chunks found finished
+  double seconds = 0;
+};
+
+/// What stages of several fabrics share during one command.
+struct StageContext {
+  Cache cache;
+  Console* console;
+  std::optional<std::uint64_t> seed;  // in place of the fabric's
+  std::vector<StageResult> results;
+
+  /// Says how a stage went, once per key, and notes it for the report.
+  void report(StageResult result);
+};
+
+/// A fabric file, read and checked.
+struct FabricDocument {
+  std::filesystem::path file;
+  FabricConfig config;
+  VisibilitySettings visibility;
+  TransferSettings transfer;
+  VolumeSettings volume;
+  std::string cloth_text;       // canonical text of what the synth stage depends on
+  std::string visibility_text;  // of [visibility]
+  std::string transfer_text;    // of [transfer] without order
+  std::string volume_text;      // of [volume]
+};
+FabricDocument read_fabric_document(const std::filesystem::path& path, std::optional<std::uint64_t> seed);
+
+/// Where a stage's artifact lies.
+struct Artifact {
+  std::string key;
+  std::filesystem::path path;
+};
+
+/// Rays from which the mean free path of a fabric is estimated: good to about 1 %.
+inline constexpr int kMeanFreePathSamples = 20000;
+
+class FabricStages {
+ public:
+  /// `context` outlives the object. A relative path is taken from the working directory.
+  FabricStages(const std::filesystem::path& fabric_file, StageContext& context);
+  ~FabricStages();
+
+  const FabricDocument& document() const { return document_; }
+
+  /// Each builds its artifact, and what that needs, where the cache lacks it.
+  Artifact synth();
+  Artifact ssdf();
+  Artifact sgs();
+  Artifact transfer(std::optional<int> order);
+  Artifact volume();
+  Artifact pack(const Needs& needs);
+
+  /// Computes this shard's chunks and leaves them in the cache; a later run of the stage finds them.
+  void visibility_shard(Shard shard);
+  void transfer_shard(std::optional<int> order, Shard shard);
+
+ private:
+  struct Stage;
+  struct TransferWork;
+  Stage make_stage(std::string name, int version, std::string extension, const std::string& config,
+                   std::vector<std::pair<std::string, std::string>> upstream) const;
+  template <class Build>
+  Artifact artifact_of(const Stage& stage, Build&& build);
+  template <class Work>
+  void run_shard(const Stage& stage, Work&& work);
+  /// compute(file, first, end) for those of the shard's chunks that are not on disk.
+  template <class Compute>
+  void finish_chunks(const Stage& stage, std::uint32_t items, std::uint32_t per_chunk, const std::string& unit, Shard shard,
+                     StageResult& result, Compute&& compute);
+  template <class Compute, class Read>
+  void read_chunks(const Stage& stage, std::uint32_t items, std::uint32_t per_chunk, Compute&& compute, Read&& read);
+
+  const Exemplar& exemplar();
+  const TileScene& scene();
+  const SegmentOrigins& origins();
+  const std::string& geometry_key();
+  const char* light_from() const;
+  Stage maps_stage();
+  Artifact maps();
+  void compute_maps(const Stage& stage, const std::filesystem::path& file, std::uint32_t first, std::uint32_t end);
+  Stage fit_stage(const std::string& name, int version);
+  TransferSettings transfer_settings(std::optional<int> order) const;
+  Stage transfer_stage(const TransferSettings& settings);
+  std::unique_ptr<TransferWork> transfer_work(const TransferSettings& settings);
+
+  FabricDocument document_;
+  StageContext* context_;
+  std::optional<Exemplar> exemplar_;
+  std::unique_ptr<TileScene> scene_;
+  std::optional<SegmentOrigins> origins_;
+  std::string geometry_key_;
+};
+
+}  // namespace heddle
+
+#endif  // HEDDLE_PIPELINE_STAGES_H_

@@ -1,0 +1,290 @@
+// The built program as a user runs it: same bytes whatever the threads, the cache, the shards and the kills; what it says
+// of broken input, and with which exit status.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "tests/pipeline/program.h"
+#include "tests/pipeline/small_fabric.h"
+#include "tests/support/temporary_folder.h"
+
+namespace heddle {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+using Arguments = std::vector<std::string>;
+
+std::map<std::string, std::string> files_of(const fs::path& folder) {
+  std::map<std::string, std::string> files;
+  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+    if (entry.is_regular_file()) files[fs::relative(entry.path(), folder).string()] = text_of(entry.path());
+  }
+  return files;
+}
+
+/// Names of differing files, so that a failure does not print megabytes.
+std::vector<std::string> differences(const fs::path& a, const fs::path& b) {
+  const auto left = files_of(a);
+  const auto right = files_of(b);
+  std::vector<std::string> names;
+  for (const auto& [name, bytes] : left) {
+    const auto other = right.find(name);
+    if (other == right.end() || other->second != bytes) names.push_back(name);
+  }
+  for (const auto& [name, bytes] : right) {
+    if (!left.contains(name)) names.push_back(name);
+  }
+  return names;
+}
+
+bool any_chunk_in(const fs::path& stage_folder) {
+  std::error_code error;
+  for (fs::recursive_directory_iterator entry(stage_folder, error), end; !error && entry != end; entry.increment(error)) {
+    if (entry->path().extension() == ".safetensors" && entry->path().parent_path().extension() == ".partial" &&
+        entry->path().filename().string().find("tmp") == std::string::npos) {
+      return true;
+    }
+  }
+  return false;
+}
+
+/// A folder with the small fabric and its scene, in which the program is run with a cache of its own.
+class Workshop {
+ public:
+  Workshop() {
+    std::ofstream(folder_.path() / "fabric.toml") << kSmallFabric;
+    std::ofstream(folder_.path() / "scene.toml") << kSmallScene;
+  }
+  fs::path operator/(const std::string& name) const { return folder_.path() / name; }
+
+  /// Arguments with their file names (those that hold a dot, or "pack") made absolute.
+  Arguments absolute(Arguments arguments) const {
+    for (std::size_t k = 1; k < arguments.size(); ++k) {
+      if (arguments[k] == "pack" || arguments[k].find('.') != std::string::npos) arguments[k] = *this / arguments[k];
+    }
+    return arguments;
+  }
+  Program start(const Arguments& arguments, const std::string& input = "") const {
+    ::setenv("HEDDLE_CACHE", (*this / "cache").c_str(), 1);
+    return Program(folder_.path(), absolute(arguments), input);
+  }
+  ProgramResult run(const Arguments& arguments, const std::string& input = "") const {
+    return start(arguments, input).wait();
+  }
+  /// The report of a job that must succeed.
+  Json report(Arguments arguments) const {
+    arguments.push_back("--json");
+    const ProgramResult result = run(arguments);
+    EXPECT_EQ(result.status, 0) << result.error;
+    return result.status == 0 ? Json::parse(result.out) : Json{{"stages", Json::array()}};
+  }
+
+ private:
+  TemporaryFolder folder_;
+};
+
+const Arguments kPrecompute = {"precompute", "fabric.toml", "-o", "pack"};
+
+/// Kills the job once a chunk of `stage` is on disk, and runs it again.
+void expect_same_bytes_after_kill(const fs::path& reference, const std::string& stage) {
+  SCOPED_TRACE("killed during " + stage);
+  const Workshop shop;
+  const fs::path chunks = shop / "cache" / stage;
+  Program program = shop.start(kPrecompute);
+  ASSERT_TRUE(program.signal_when([&] { return any_chunk_in(chunks); }, SIGKILL)) << program.wait().error;
+  ASSERT_EQ(program.wait().status, -SIGKILL);
+  ASSERT_TRUE(any_chunk_in(chunks)) << "the stage was over before it was killed";
+
+  std::uint64_t found = 0;
+  for (const Json& entry : shop.report(kPrecompute).at("stages")) {
+    if (entry.at("stage") == stage) found = entry.at("chunks_found").get<std::uint64_t>();
+  }
+  EXPECT_GE(found, 1U);
+  EXPECT_EQ(differences(reference, shop / "pack"), std::vector<std::string>{});
+  EXPECT_FALSE(any_chunk_in(chunks)) << "chunks are removed once the artifact is published";
+}
+
+TEST(StagesEndToEnd, SameBytesHoweverTheJobIsRun) {
+  const Workshop shop;
+  const fs::path reference = shop / "pack";
+  const Json cold = shop.report({"precompute", "fabric.toml", "-o", "pack", "--threads", "2"});
+  EXPECT_GE(cold.at("stages").size(), 6U);
+  for (const Json& stage : cold.at("stages")) EXPECT_TRUE(stage.at("built").get<bool>()) << stage.dump();
+  {
+    SCOPED_TRACE("warm cache");
+    const Json warm = shop.report({"precompute", "fabric.toml"});
+    EXPECT_GE(warm.at("stages").size(), 5U);
+    for (const Json& stage : warm.at("stages")) EXPECT_FALSE(stage.at("built").get<bool>()) << stage.dump();
+  }
+  {
+    SCOPED_TRACE("another dye keeps the visibility");
+    const std::string color = "[0.2, 0.3, 0.4]";
+    std::string dyed = kSmallFabric;
+    std::ofstream(shop / "dyed.toml") << dyed.replace(dyed.find(color), color.size(), "[0.9, 0.1, 0.1]");
+    const Json report = shop.report({"visibility", "dyed.toml"});
+    for (const Json& stage : report.at("stages")) {
+      EXPECT_EQ(stage.at("built").get<bool>(), stage.at("stage") == "synth") << stage.dump();
+    }
+  }
+  {
+    SCOPED_TRACE("one thread, two shards each");
+    const Workshop other;
+    for (const char* stage : {"visibility", "transfer"}) {
+      for (const char* shard : {"1/2", "2/2"}) other.report({stage, "fabric.toml", "--shard", shard, "-j", "1"});
+    }
+    const Json report = other.report({"precompute", "fabric.toml", "-o", "pack", "-j", "1"});
+    for (const Json& stage : report.at("stages")) EXPECT_EQ(stage.at("chunks_built"), 0) << stage.dump();
+    EXPECT_EQ(differences(reference, other / "pack"), std::vector<std::string>{});
+  }
+  expect_same_bytes_after_kill(reference, "maps");
+  expect_same_bytes_after_kill(reference, "transfer");
+}
+
+TEST(StagesEndToEnd, SignalsEndWithTheirStatusAndKeepChunks) {
+  const Workshop shop;
+  for (const auto& [signal_number, status] : {std::pair{SIGINT, 130}, std::pair{SIGTERM, 143}}) {
+    fs::remove_all(shop / "cache");
+    Program program = shop.start({"visibility", "fabric.toml"});
+    ASSERT_TRUE(program.signal_when([&] { return any_chunk_in(shop / "cache" / "maps"); }, signal_number));
+    const ProgramResult result = program.wait();
+    EXPECT_EQ(result.status, status) << result.error;
+    EXPECT_NE(result.error.find("interrupted"), std::string::npos) << result.error;
+    EXPECT_TRUE(any_chunk_in(shop / "cache" / "maps"));
+  }
+}
+
+TEST(PackEndToEnd, DamagedPacksAreRefused) {
+  const Workshop shop;
+  shop.report(kPrecompute);
+  EXPECT_EQ(shop.run({"check", "pack"}).status, 0);
+  const Json info = shop.report({"info", "pack"});
+  EXPECT_EQ(info.at("name"), "small");
+
+  fs::rename(shop / "pack", shop / "sound");
+  int refused = 0;
+  for (const auto& [name, bytes] : files_of(shop / "sound")) {
+    std::vector<std::pair<std::string, std::string>> damages = {{"empty", ""},
+                                                                {"cut in half", bytes.substr(0, bytes.size() / 2)},
+                                                                {"cut by a byte", bytes.substr(0, bytes.size() - 1)}};
+    for (const double place : {0.0, 0.1, 0.37, 0.5, 0.81, 0.99}) {
+      std::string flipped = bytes;
+      flipped[static_cast<std::size_t>(place * static_cast<double>(bytes.size()))] ^= 0x10;
+      damages.emplace_back("a bit flipped at " + std::to_string(place), flipped);
+    }
+    for (const auto& [damage, damaged] : damages) {
+      fs::remove_all(shop / "pack");
+      fs::copy(shop / "sound", shop / "pack");
+      std::ofstream(shop / "pack" / name, std::ios::binary | std::ios::trunc) << damaged;
+      const ProgramResult result = shop.run({"check", "pack"});
+      // A manifest without its last line feed says the same.
+      if (name == "manifest.json" && damage == "cut by a byte") continue;
+      EXPECT_EQ(result.status, 1) << name << ": " << damage << ": " << result.error;
+      EXPECT_NE(result.error.find(name), std::string::npos) << damage << ": " << result.error;
+      ++refused;
+    }
+  }
+  EXPECT_EQ(refused, 6 * 9 - 1);
+}
+
+TEST(PackEndToEnd, NumpyAloneOpensAPack) {
+  const Workshop shop;
+  ASSERT_EQ(shop.run({"synth", "fabric.toml"}).status, 0);
+  // The snippet of the README, as it stands there.
+  const std::string readme = text_of(fs::path(HEDDLE_SOURCE_DIR) / "README.md");
+  const std::string fence = "```python\n";
+  const std::size_t begin = readme.find(fence);
+  ASSERT_NE(begin, std::string::npos);
+  const std::string snippet = readme.substr(begin + fence.size(), readme.find("```", begin + 3) - begin - fence.size());
+
+  fs::create_directories(shop / "cotton.pack");
+  for (const auto& [name, bytes] : files_of(shop / "cache" / "synth")) {
+    std::ofstream(shop / "cotton.pack" / "fibers.safetensors", std::ios::binary) << bytes;
+  }
+  std::ofstream(shop / "snippet.py") << snippet << "print(tensors['points_mm'].shape[1], tensors['radius_mm'].min() * 1000)\n";
+  const std::string command =
+      "cd '" + (shop / "").string() + "' && /usr/bin/python3 snippet.py > printed.txt 2>&1";
+  EXPECT_EQ(std::system(command.c_str()), 0) << text_of(shop / "printed.txt");
+  EXPECT_EQ(text_of(shop / "printed.txt").substr(0, 5), "3 10.") << text_of(shop / "printed.txt");
+}
+
+TEST(PicturesEndToEnd, SameBytesForOneAndTwoThreadsAndNothingTwice) {
+  const Workshop shop;
+  const Json first = shop.report({"run", "scene.toml", "-o", "pictures.2", "-j", "2"});
+  EXPECT_GE(first.at("artifacts").size(), 3U) << "picture, reference, difference";
+  const Json again = shop.report({"run", "scene.toml", "-o", "pictures.again"});
+  for (const Json& stage : again.at("stages")) EXPECT_FALSE(stage.at("built").get<bool>()) << stage.dump();
+
+  fs::remove_all(shop / "cache" / "picture");
+  shop.report({"run", "scene.toml", "-o", "pictures.1", "-j", "1"});
+  for (const auto& [name, bytes] : files_of(shop / "pictures.2")) {
+    EXPECT_EQ(text_of(shop / "pictures.again" / name), bytes) << name;
+    const bool has_timings = name.ends_with(".json") && name.find("difference") == std::string::npos;
+    if (!has_timings) EXPECT_EQ(text_of(shop / "pictures.1" / name), bytes) << name;
+  }
+
+  // The other methods, a crop, and the exit statuses of compare.
+  ASSERT_EQ(shop.run({"render", "scene.toml", "-o", "volume.exr", "--method", "volume"}).status, 0);
+  ASSERT_EQ(shop.run({"render", "scene.toml", "-o", "exact.exr"}).status, 0);
+  EXPECT_EQ(text_of(shop / "exact.exr"), text_of(shop / "pictures.2" / "scene.exr"));
+  ASSERT_EQ(shop.run({"render", "scene.toml", "-o", "crop.exr", "--crop", "4,4,12,10", "--method", "path", "--local"}).status, 0);
+  EXPECT_EQ(shop.run({"compare", "volume.exr", "exact.exr", "-o", "difference.exr"}).status, 0);
+  EXPECT_EQ(shop.run({"compare", "volume.exr", "exact.exr", "--max-rmse", "0"}).status, 1);
+  EXPECT_EQ(shop.run({"compare", "volume.exr", "crop.exr"}).status, 2);
+  EXPECT_EQ(shop.run({"render", "scene.toml", "-o", "x.exr", "--local"}).status, 2);
+  EXPECT_EQ(shop.run({"render", "scene.toml", "-o", "x.exr", "--crop", "0,0,25,24"}).status, 2);
+}
+
+struct BadInput {
+  std::string name;
+  Arguments arguments;
+  std::string file;     // content of bad.toml
+  int status;
+  std::string message;  // part of what must be said
+};
+
+std::string edited(const char* original, const std::string& from, const std::string& to) {
+  std::string text = original;
+  const std::size_t at = text.find(from);
+  EXPECT_NE(at, std::string::npos) << from;
+  return text.replace(at, from.size(), to);
+}
+
+TEST(InputEndToEnd, BadInputIsNamed) {
+  const Arguments synth = {"synth", "bad.toml"};
+  const std::vector<BadInput> cases = {
+      {"syntax", synth, edited(kSmallFabric, "name = \"small\"", "name = "), 2, "bad.toml:1:"},
+      {"unknown key", synth, edited(kSmallFabric, "migration = 0", "migrtion = 0"), 2, "migr"},
+      {"missing key", synth, edited(kSmallFabric, "radius_um = 10\n", ""), 2, "radius_um"},
+      {"missing section", synth, edited(kSmallFabric, "[volume]\n", ""), 2, "volume"},
+      {"wrong type", synth, edited(kSmallFabric, "plies = 1", "plies = \"one\""), 2, "plies"},
+      {"wrong unit", synth, edited(kSmallFabric, "radius_um = 10", "radius_mm = 0.01"), 2, "radius_um"},
+      {"out of range", synth, edited(kSmallFabric, "beta_r_deg = 5", "beta_r_deg = 500"), 2, "beta_r_deg"},
+      {"NaN", synth, edited(kSmallFabric, "beta_r_deg = 5", "beta_r_deg = nan"), 2, "beta_r_deg"},
+      {"bad notation", synth, edited(kSmallFabric, "\"plain\"", "\"plaid\""), 2, "bad.toml:6:"},
+      {"unknown fiber", synth, edited(kSmallFabric, "fiber = \"thread\"", "fiber = \"wool\""), 2, "wool"},
+      {"no such config", {"synth", "missing.toml"}, "", 2, "missing.toml"},
+      {"no such pack", {"check", "missing.pack"}, "", 1, "missing.pack"},
+      {"no such file", {"info", "missing.exr"}, "", 1, "missing.exr"},
+      {"not comparable", {"compare", "missing.exr", "other.exr"}, "", 2, "missing.exr"},
+      {"no subcommand", {"weave"}, "", 2, "weave"},
+      {"unknown option", {"synth", "fabric.toml", "--colour"}, "", 2, "--colour"},
+      {"bad option value", {"synth", "fabric.toml", "--threads", "0"}, "", 2, "--threads"},
+      {"bad shard", {"visibility", "fabric.toml", "--shard", "3/2"}, "", 2, "--shard"},
+      {"bad eval line", {"eval"}, "", 1, ""},
+  };
+  const Workshop shop;
+  for (const BadInput& bad : cases) {
+    SCOPED_TRACE(bad.name);
+    std::ofstream(shop / "bad.toml") << bad.file;
+    const ProgramResult result = shop.run(bad.arguments, "{\n");
+    EXPECT_EQ(result.status, bad.status) << result.error;
+    EXPECT_NE(result.error.find(bad.message), std::string::npos) << result.error;
+  }
+}
+
+}  // namespace
+}  // namespace heddle
