@@ -30,11 +30,11 @@ using RowMajorMatrix = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eige
 TransferSettings read_transfer_settings(const TomlTable& section) {
   TransferSettings settings;
   settings.order = static_cast<int>(section.integer("order", 0, 5, 5));
-  settings.cell_mean_free_paths = section.number("cell_mean_free_paths", {.min = 0.25, .max = 100}, 1.0);
+  settings.cell_mean_free_paths = section.number("cell_mean_free_paths", {.min = 0.25, .max = 100}, 4.0);
   settings.min_paths = static_cast<int>(section.integer("min_paths", 1, 100'000'000, 4096));
-  settings.max_paths = static_cast<int>(section.integer("max_paths", 1, 100'000'000, 65536));
+  settings.max_paths = static_cast<int>(section.integer("max_paths", 1, 100'000'000, 32768));
   if (settings.max_paths < settings.min_paths) section.fail("max_paths", "expected at least min_paths");
-  settings.target_error = section.number("target_error", {.min = 1e-4, .max = 1}, 0.05);
+  settings.target_error = section.number("target_error", {.min = 1e-4, .max = 1}, 0.02);
   return settings;
 }
 
@@ -100,9 +100,8 @@ void TransferBaker::bake_cell(std::uint32_t cell, float* matrix, float* standard
     const Eigen::ArrayXXd average = sum / batches;
     const Eigen::ArrayXXd squared_error =
         (sum_of_squares / batches - average.square()).max(0.0) / static_cast<double>(batches - 1);
-    if (!last && squared_error.sum() > settings_.target_error * settings_.target_error * average.square().sum()) {
-      continue;
-    }
+    const double brightest = average.row(0).head<3>().maxCoeff();
+    if (!last && squared_error.mean() > std::pow(settings_.target_error * brightest, 2)) continue;
     for (int j0 = 0; j0 < n; ++j0) {
       for (int k = 0; k < 3 * n; ++k) matrix[j0 * 3 * n + k] = static_cast<float>(average(j0, k));
     }

@@ -31,7 +31,7 @@ struct TransferSettings {
   double cell_mean_free_paths = 1;  // edge of a cell in mean free paths
   int min_paths = 0;                // per cell, rounded up to whole batches
   int max_paths = 0;
-  double target_error = 0;          // standard error of the matrix (Frobenius norm) relative to its norm
+  double target_error = 0;          // rms standard error of the matrix' entries relative to a[0][0], brightest colour
   bool both_sides = false;
   std::uint64_t seed = 1;
 };

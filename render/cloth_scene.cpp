@@ -64,7 +64,8 @@ ClothScene::ClothScene(std::vector<ClothPiece> pieces, std::vector<TriangleMesh>
       black_(black_meshes) {}
 
 bool ClothScene::occluded(const SceneRay& ray) const {
-  if (black_.occluded(ray.origin.cast<float>(), ray.direction, static_cast<float>(ray.t_max))) return true;
+  // Meshes first: a ray through them costs a quarter of one through fibers.
+  if (meets_black(ray.origin, ray.direction, ray.t_max)) return true;
   bool is_blocked = false;
   double limit = ray.t_max;
   walk(ray, RayReach::kEverything, limit,

@@ -84,6 +84,10 @@ class ClothScene {
   /// Does the ray meet a fiber or a black mesh?
   bool occluded(const SceneRay& ray) const;
 
+  /// Does the ray meet a black mesh in (0, t_max]?
+  bool meets_black(const Vec3d& origin, const Vec3& direction, double t_max) const {
+    return black_.occluded(origin.cast<float>(), direction, static_cast<float>(t_max));
+  }
   /// Distance to the first black mesh.
   std::optional<float> first_black(const Vec3d& origin, const Vec3& direction) const {
     return black_.intersect(origin.cast<float>(), direction);

@@ -35,13 +35,14 @@ class ClothTrace {
   }
 
   std::optional<Vertex> next(const Vertex& from, const Vec3& direction) const {
-    SceneRay ray{from.hit.position, direction, &from.hit};
-    const std::optional<float> black = scene_->first_black(ray.origin, direction);
-    if (black) ray.t_max = static_cast<double>(*black);
+    const SceneRay ray{from.hit.position, direction, &from.hit};
     const std::optional<ShellHit> hit =
         scene_->first_fiber(ray, local_ ? RayReach::kOwnShell : RayReach::kEverything);
-    if (hit) return vertex(*hit);
-    if (!black && !(local_ && scene_->occluded(ray))) return {};
+    // The cloth first: most hits are near, and leave little to search for black meshes.
+    if (!scene_->meets_black(ray.origin, direction, hit ? hit->t : ray.t_max)) {
+      if (hit) return vertex(*hit);
+      if (!local_ || !scene_->occluded(ray)) return {};
+    }
     Vertex end = from;
     end.is_end = true;
     return end;

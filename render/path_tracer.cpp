@@ -70,14 +70,13 @@ PathTracer::Sample PathTracer::radiance(const ClothTrace::Vertex& vertex, const 
 }
 
 PathTracer::Sample PathTracer::trace(const EyeRay& ray, RandomStream& random) const {
-  SceneRay scene_ray{ray.origin, ray.direction};
-  const std::optional<float> black = scene_->first_black(ray.origin, ray.direction);
-  if (black) scene_ray.t_max = static_cast<double>(*black);
+  const SceneRay scene_ray{ray.origin, ray.direction};
+  const std::optional<ShellHit> hit = scene_->first_fiber(scene_ray);
   Sample sample;
-  if (const std::optional<ShellHit> hit = scene_->first_fiber(scene_ray)) {
-    sample = radiance(trace_.vertex(*hit), -ray.direction, random);
+  if (scene_->meets_black(ray.origin, ray.direction, hit ? hit->t : scene_ray.t_max)) {
     sample.alpha = 1;
-  } else if (black) {
+  } else if (hit) {
+    sample = radiance(trace_.vertex(*hit), -ray.direction, random);
     sample.alpha = 1;
   } else {
     sample.background = background_;

@@ -1,0 +1,120 @@
+#include "fibers/baked/fabric_pack.h"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "formats/atomic_file.h"
+#include "formats/input_error.h"
+#include "tests/support/small_exemplars.h"
+#include "tests/support/temporary_folder.h"
+
+namespace heddle {
+namespace {
+
+/// A pack with fibers only.
+class FabricPackFormat : public testing::Test {
+ protected:
+  FabricPackFormat() {
+    write_exemplar(folder_.path() / "fibers.safetensors", crossed_layers(test_cotton()), {});
+    manifest_.name = "crossed \"layers\"";
+    manifest_.key = "00ff";
+    manifest_.program_version = "1.2.3";
+    manifest_.light_from_both_sides = true;
+    manifest_.counts = {{"fibers", 8}};
+    manifest_.files = {{"fibers.safetensors", {}}};
+  }
+  std::string refusal() const {
+    try {
+      load_pack(folder_.path());
+    } catch (const FileError& error) {
+      return error.what();
+    }
+    return "no error";
+  }
+  void replace_in_manifest(const std::string& from, const std::string& to) const {
+    const auto bytes = read_whole_file(folder_.path() / kManifestName);
+    std::string text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    const std::size_t at = text.find(from);
+    ASSERT_NE(at, std::string::npos) << from;
+    write_file_atomically(folder_.path() / kManifestName, text.replace(at, from.size(), to));
+  }
+  TemporaryFolder folder_;
+  PackManifest manifest_;
+};
+
+TEST_F(FabricPackFormat, ComesBackAsWritten) {
+  write_manifest(folder_.path(), manifest_);
+  const FabricPack pack = load_pack(folder_.path());
+  EXPECT_EQ(pack.name, manifest_.name);
+  EXPECT_EQ(pack.key, "00ff");
+  EXPECT_TRUE(pack.light_from_both_sides);
+  EXPECT_EQ(pack.exemplar.points, crossed_layers(test_cotton()).points);
+  EXPECT_EQ(pack.materials.size(), 1U);
+  EXPECT_FALSE(pack.ssdf || pack.sgs || pack.transfer || pack.volume);
+  EXPECT_TRUE(pack.cell_of_segment.empty());
+}
+
+TEST_F(FabricPackFormat, NamesOutsideThePackAreRefused) {
+  for (const char* name : {"../fibers.safetensors", "/etc/passwd", "extra.safetensors", ".", "", "sub/fibers.safetensors"}) {
+    PackManifest hostile = manifest_;
+    hostile.files[name] = {};
+    // Where the name leads to a file its size and checksum are even right.
+    for (auto& [file, entry] : hostile.files) {
+      std::error_code ignored;
+      if (!std::filesystem::is_regular_file(folder_.path() / file, ignored)) {
+        std::filesystem::create_directories((folder_.path() / file).parent_path(), ignored);
+      }
+    }
+    try {
+      write_manifest(folder_.path(), hostile);
+    } catch (const std::exception&) {
+      continue;  // no such file to take a checksum of; the names that are real files remain
+    }
+    EXPECT_NE(refusal().find("no part of a pack"), std::string::npos) << name << ": " << refusal();
+  }
+}
+
+TEST_F(FabricPackFormat, EveryChangeOfTheManifestIsSeen) {
+  for (const auto& [from, to] : std::vector<std::pair<std::string, std::string>>{
+           {"crossed", "crosses"}, {"00ff", "00fe"}, {"1.2.3", "1.2.4"}, {"\"both\"", "\"face\""}, {"\"fibers\": 8", "\"fibers\": 9"}}) {
+    write_manifest(folder_.path(), manifest_);
+    replace_in_manifest(from, to);
+    EXPECT_NE(refusal().find("manifest.json"), std::string::npos) << from;
+  }
+  write_manifest(folder_.path(), manifest_);
+  replace_in_manifest("\"version\": 1", "\"version\": 2");
+  EXPECT_NE(refusal().find("layout 2"), std::string::npos) << refusal();
+}
+
+TEST_F(FabricPackFormat, MissingTruncatedAndFlippedFilesAreNamed) {
+  const std::filesystem::path file = folder_.path() / "fibers.safetensors";
+  write_manifest(folder_.path(), manifest_);
+  const std::vector<std::byte> bytes = read_whole_file(file);
+
+  write_file_atomically(file, std::span(bytes).first(bytes.size() - 1));
+  EXPECT_NE(refusal().find("fibers.safetensors"), std::string::npos);
+  EXPECT_NE(refusal().find("truncated"), std::string::npos);
+  for (const std::size_t place : {std::size_t{0}, bytes.size() / 2, bytes.size() - 1}) {
+    std::vector<std::byte> flipped = bytes;
+    flipped[place] ^= std::byte{1};
+    write_file_atomically(file, flipped);
+    EXPECT_NE(refusal().find("fibers.safetensors"), std::string::npos);
+    EXPECT_NE(refusal().find("checksum"), std::string::npos);
+  }
+  std::filesystem::remove(file);
+  EXPECT_NE(refusal().find("fibers.safetensors"), std::string::npos);
+  std::filesystem::remove(folder_.path() / kManifestName);
+  EXPECT_NE(refusal().find("manifest.json"), std::string::npos);
+}
+
+TEST_F(FabricPackFormat, ManifestsThatAreNone) {
+  for (const char* text : {"", "{", "[]", "null", "{}", "{\"format\": 3}", "{\"format\": \"heddle pack\", \"version\": 1}",
+                           "{\"format\": \"heddle pack\", \"version\": 1, \"manifest_xxh3_128\": []}"}) {
+    write_file_atomically(folder_.path() / kManifestName, std::string_view(text));
+    EXPECT_NE(refusal().find("manifest"), std::string::npos) << text;
+  }
+}
+
+}  // namespace
+}  // namespace heddle

@@ -1,0 +1,95 @@
+// configs/README.md documents every key that the parsers ask for, with its type, range and default, and no other.
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <regex>
+#include <sstream>
+#include <string>
+
+#include "fibers/cloth/fabric_config.h"
+#include "formats/toml_table.h"
+#include "precompute/transfer_bake.h"
+#include "precompute/visibility_settings.h"
+#include "precompute/voxelize.h"
+#include "render/scene_config.h"
+
+namespace heddle {
+namespace {
+
+namespace fs = std::filesystem;
+
+const fs::path kConfigs = fs::path(HEDDLE_SOURCE_DIR) / "configs";
+
+/// "| `key` | type | range | default | meaning |" -> key: "type | range | default"
+using Keys = std::map<std::string, std::string>;
+
+/// The rows of one section of the README ("## Fabrics").
+Keys documented(const std::string& section) {
+  std::ifstream stream(kConfigs / "README.md");
+  const std::regex row(R"(\| `([^`]+)` \| ([^|]+) \| ([^|]*(?:\\\|[^|]*)*) \| ([^|]+) \| ([^|]+)\|)");
+  Keys keys;
+  bool inside = false;
+  for (std::string line; std::getline(stream, line);) {
+    if (line.starts_with("## ")) inside = line == "## " + section;
+    std::smatch match;
+    if (!inside || !std::regex_match(line, match, row)) continue;
+    const std::string range = std::regex_replace(match[3].str(), std::regex(R"(\\\|)"), "|");
+    EXPECT_FALSE(keys.contains(match[1])) << match[1] << " is documented twice";
+    keys[match[1]] = match[2].str() + " | " + range + " | " + match[4].str();
+  }
+  return keys;
+}
+
+void add(const TomlTable& document, Keys& keys) {
+  for (const AskedKey& key : document.asked_keys()) keys[key.path] = key.type + " | " + key.range + " | " + key.default_value;
+}
+
+std::vector<fs::path> files_in(const char* folder) {
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::directory_iterator(kConfigs / folder)) {
+    if (entry.path().extension() == ".toml") files.push_back(entry.path());
+  }
+  return files;
+}
+
+void expect_equal(const Keys& asked, const Keys& documented) {
+  for (const auto& [key, properties] : asked) {
+    const auto found = documented.find(key);
+    if (found == documented.end()) {
+      ADD_FAILURE() << "not documented: | `" << key << "` | " << properties << " | ... |";
+    } else {
+      EXPECT_EQ(found->second, properties) << key;
+    }
+  }
+  for (const auto& [key, properties] : documented) EXPECT_TRUE(asked.contains(key)) << key << " is documented, and nobody asks for it";
+}
+
+TEST(ConfigDocumentation, NamesEveryKeyOfAFabric) {
+  Keys asked;
+  for (const fs::path& file : files_in("fabrics")) {
+    const TomlTable document = TomlTable::load(file);
+    const FabricConfig config = read_fabric_config(document);
+    read_visibility_settings(document.table("visibility"), config.light_from_both_sides);
+    read_transfer_settings(document.table("transfer"));
+    read_volume_settings(document.table("volume"));
+    document.finish();
+    add(document, asked);
+  }
+  expect_equal(asked, documented("Fabrics"));
+}
+
+TEST(ConfigDocumentation, NamesEveryKeyOfAScene) {
+  Keys asked;
+  for (const fs::path& file : files_in("scenes")) {
+    const TomlTable document = TomlTable::load(file);
+    read_scene_config(document);
+    add(document, asked);
+  }
+  expect_equal(asked, documented("Scenes"));
+}
+
+}  // namespace
+}  // namespace heddle
