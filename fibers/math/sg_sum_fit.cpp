@@ -10,6 +10,9 @@
 namespace heddle {
 namespace {
 
+// Edge in radians of the parts into which cells are cut to integrate over them.
+constexpr double kLargestPart = 0.025;
+
 // Integral over the sphere of the product of two normalised Gaussians.
 double normalised_overlap(const Vec3d& axis_a, double sharpness_a, const Vec3d& axis_b, double sharpness_b) {
   const SgProduct product = sg_product({axis_a, sharpness_a}, {axis_b, sharpness_b});
@@ -36,13 +39,20 @@ SgSumFit::SgSumFit(int resolution, const SgSumShape& shape)
     }
     return;
   }
-  projection_.resize(shape.count, rows_ * resolution);
-  for (int row = 0; row < rows_; ++row) {
-    for (int column = 0; column < resolution; ++column) {
-      const Vec3d centre = grid.centre(row, column);
+  // Cells are cut into parts far smaller than the blur's width of 0.09 rad.
+  const int row_parts = static_cast<int>(std::ceil(grid.row_step() / kLargestPart));
+  const int column_parts = static_cast<int>(std::ceil(grid.column_step() / kLargestPart));
+  projection_.setZero(shape.count, rows_ * resolution);
+  for (int row = 0; row < rows_ * row_parts; ++row) {
+    const double polar = (row + 0.5) * grid.row_step() / row_parts;
+    const double area =
+        std::sin(polar) * 2 * std::sin(0.5 * grid.row_step() / row_parts) * grid.column_step() / column_parts;
+    for (int column = 0; column < resolution * column_parts; ++column) {
+      const double azimuth = (column + 0.5) * grid.column_step() / column_parts;
+      const Vec3d part(std::sin(polar) * std::cos(azimuth), std::sin(polar) * std::sin(azimuth), std::cos(polar));
       for (int q = 0; q < shape.count; ++q) {
-        projection_(q, row * resolution + column) =
-            static_cast<float>(grid.solid_angle(row) * normalised_overlap(axes_[q], shape.sharpness, centre, kBlur));
+        projection_(q, (row / row_parts) * resolution + column / column_parts) +=
+            static_cast<float>(area * normalised_overlap(axes_[q], shape.sharpness, part, kBlur));
       }
     }
   }
