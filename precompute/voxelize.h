@@ -15,8 +15,10 @@
 namespace heddle {
 
 struct VolumeSettings {
-  /// Voxels along the radius of the thinnest fiber.
-  double voxels_per_radius = 1;
+  /// Voxels along the radius of the thinnest fiber. Flat swatch of a small cotton tile, RMSE of all light over 492 pairs of
+  /// directions, and bytes of the file per segment: 1: 7.8 %, 60; 1.5: 6.7 %, 170; 2: 6.1 %, 350; 3: 6.0 %, 970; rays against
+  /// the fibers: 5.3 %.
+  double voxels_per_radius = 1.5;
 };
 
 /// Reads the keys of a fabric's section [volume].

@@ -86,87 +86,58 @@ std::optional<FiberHit> IdBricks::first_hit(const Ray& ray) const {
     t_end = std::min(t_end, std::max(at_bottom, at_top));
   }
   if (!(t <= t_end)) return {};
+  // Start in tile (0, 0).
+  for (int a = 0; a < 2; ++a) origin[a] -= std::floor((origin[a] + t * slope[a]) / size_[a]) * size_[a];
 
-  // Start in tile (0, 0); `cell` counts voxels without wrapping, `wrapped` within the tile.
-  int cell[3];
-  int wrapped[3];
-  for (int a = 0; a < 3; ++a) {
-    if (a < 2) origin[a] -= std::floor((origin[a] + t * slope[a]) / size_[a]) * size_[a];
-    cell[a] = std::clamp(static_cast<int>(std::floor(origin[a] + t * slope[a])), 0, size_[a] - 1);
-    wrapped[a] = cell[a];
-  }
-  int tiles_left = TileScene::kMaxTiles;
-
-  // Parameter where the ray crosses plane `plane` of axis a.
-  const auto crossing = [&](int a, int plane) {
-    return slope[a] == 0 ? kInfinity : (plane - origin[a]) * inverse[a];
+  // Slices across the axis along which the ray passes the most voxels; each is looked at where the ray meets its middle.
+  int axis = std::abs(slope[0]) >= std::abs(slope[1]) ? 0 : 1;
+  if (std::abs(slope[2]) >= std::abs(slope[axis])) axis = 2;
+  const bool ascending = slope[axis] > 0;
+  const auto slice_from = [&](double at) {  // first slice whose middle is not before the parameter `at`
+    const double position = origin[axis] + at * slope[axis] - 0.5;
+    return static_cast<int>(ascending ? std::ceil(position) : std::floor(position));
   };
-  // Brings `wrapped` of axis a back into the tile after a step out of it; false once the ray is over.
-  const auto wrap = [&](int a) {
-    if (wrapped[a] >= 0 && wrapped[a] < size_[a]) return true;
-    if (a == 2 || --tiles_left == 0) return false;
-    wrapped[a] = wrapped[a] < 0 ? size_[a] - 1 : 0;
-    return true;
-  };
-  const auto earliest = [](const double* next) {
-    if (next[0] <= next[1]) return next[0] <= next[2] ? 0 : 2;
-    return next[1] <= next[2] ? 1 : 2;
-  };
-
-  while (true) {
-    // The brick around the current voxel: voxels first .. last along each axis, not wrapped. Bricks at the
-    // far edge of the tile are cut off there.
-    int first[3];
-    int last[3];
-    int within[3];
+  int slice = slice_from(t);
+  const int last_slice = slice + (ascending ? 1 : -1) * TileScene::kMaxTiles * size_[axis];
+  while (slice != last_slice) {
+    t = (slice + 0.5 - origin[axis]) * inverse[axis];
+    if (!(t <= t_end)) return {};
+    int cell[3];     // not wrapped
+    int wrapped[3];  // within the tile
     for (int a = 0; a < 3; ++a) {
-      within[a] = wrapped[a] % kEdge;
-      first[a] = cell[a] - within[a];
-      last[a] = first[a] + std::min(kEdge, size_[a] - (wrapped[a] - within[a])) - 1;
+      cell[a] = a == axis ? slice : static_cast<int>(std::floor(origin[a] + t * slope[a]));
+      if (a == 2) cell[a] = std::clamp(cell[a], 0, size_[2] - 1);
+      wrapped[a] = cell[a];
+      if (cell[a] < 0 || cell[a] >= size_[a]) {
+        wrapped[a] = cell[a] % size_[a];
+        if (wrapped[a] < 0) wrapped[a] += size_[a];
+      }
     }
     const std::uint32_t start =
-        brick_start_[(static_cast<std::size_t>(wrapped[2] / kEdge) * bricks_[1] + wrapped[1] / kEdge) *
-                         bricks_[0] +
+        brick_start_[(static_cast<std::size_t>(wrapped[2] / kEdge) * bricks_[1] + wrapped[1] / kEdge) * bricks_[0] +
                      wrapped[0] / kEdge];
-    double next[3];  // parameter of the next plane along each axis
-    if (start == kEmptyBrick) {
-      // Through the empty brick in one step.
-      for (int a = 0; a < 3; ++a) next[a] = crossing(a, slope[a] > 0 ? last[a] + 1 : first[a]);
-      const int axis = earliest(next);
-      t = std::max(t, next[axis]);
-      if (!(t <= t_end)) return {};
-      for (int a = 0; a < 3; ++a) {
-        const int from = cell[a];
-        if (a == axis) {
-          cell[a] = slope[a] > 0 ? last[a] + 1 : first[a] - 1;
-        } else {
-          cell[a] = std::clamp(static_cast<int>(std::floor(origin[a] + t * slope[a])), first[a], last[a]);
-        }
-        wrapped[a] += cell[a] - from;
-      }
-      if (!wrap(axis)) return {};
+    if (start != kEmptyBrick) {
+      const std::int32_t id = ids_[start + within_brick(wrapped[0] % kEdge, wrapped[1] % kEdge, wrapped[2] % kEdge)];
+      if (id >= 0)
+        return FiberHit{static_cast<float>(std::max(t, static_cast<double>(ray.t_min))),
+                        static_cast<std::uint32_t>(id)};
+      slice += ascending ? 1 : -1;
       continue;
     }
-    // Voxel by voxel through the brick.
-    const std::int32_t* ids = &ids_[start];
-    for (int a = 0; a < 3; ++a) next[a] = crossing(a, slope[a] > 0 ? cell[a] + 1 : cell[a]);
-    while (true) {
-      const std::int32_t id = ids[within_brick(within[0], within[1], within[2])];
-      if (id >= 0) return FiberHit{static_cast<float>(t), static_cast<std::uint32_t>(id)};
-      const int axis = earliest(next);
-      t = std::max(t, next[axis]);
-      if (!(t <= t_end)) return {};
-      const int step = slope[axis] > 0 ? 1 : -1;
-      cell[axis] += step;
-      wrapped[axis] += step;
-      within[axis] += step;
-      if (cell[axis] < first[axis] || cell[axis] > last[axis]) {
-        if (!wrap(axis)) return {};
-        break;
-      }
-      next[axis] = crossing(axis, slope[axis] > 0 ? cell[axis] + 1 : cell[axis]);
+    // Past the empty brick in one step. Bricks at the far edge of the tile are cut off there.
+    double t_exit = kInfinity;
+    for (int a = 0; a < 3; ++a) {
+      if (slope[a] == 0) continue;
+      const int low = cell[a] - wrapped[a] % kEdge;
+      const int high = low + std::min(kEdge, size_[a] - (wrapped[a] - wrapped[a] % kEdge));
+      t_exit = std::min(t_exit, ((slope[a] > 0 ? high : low) - origin[a]) * inverse[a]);
     }
+    if (!(t_exit <= t_end)) return {};
+    const int next = slice_from(t_exit);
+    // At least one slice further, and not past the limit.
+    slice = ascending ? std::clamp(next, slice + 1, last_slice) : std::clamp(next, last_slice, slice - 1);
   }
+  return {};
 }
 
 }  // namespace heddle

@@ -204,7 +204,9 @@ TEST(PrecomputedRendererLaw, ShadowOfARoofIsHardInSingleAndGaussianInMultipleSca
     // 24 x 16 draws of 0 or 1, and the column's 0.025 mm, over which Phi bends by less than 0.01.
     const double error = std::abs(multiple / multiple_lit - expected) - 0.01;
     worst = std::max(worst, error / std::sqrt(expected * (1 - expected) / (24 * 16) + 1e-6));
-    if (std::abs(position) > 0.05) EXPECT_NEAR(single / single_lit, position < 0 ? 1 : 0, 1e-6);
+    if (std::abs(position) > 0.05) {
+      EXPECT_NEAR(single / single_lit, position < 0 ? 1 : 0, 1e-6);
+    }
   }
   std::printf("  worst column: %.2f standard errors\n", worst);
   EXPECT_LT(worst, 3.5);  // of 32 columns
@@ -250,17 +252,19 @@ TEST(PrecomputedRendererAgreement, VolumeSeesWhatFibersShow) {
   const FrameBuffers volume = shade_picture(world->renderer(settings), camera, {0, 0, 48, 48}, 1, kNoProgress);
   int both = 0;
   int same_fiber = 0;
+  int near = 0;
   for (std::size_t k = 0; k < fibers.pixel_count(); ++k) {
     if (fibers.segment[k] == 0xffffffffU || volume.segment[k] == 0xffffffffU) continue;
     ++both;
     if (world->pack.exemplar.segment_fiber[fibers.segment[k]] != world->pack.exemplar.segment_fiber[volume.segment[k]])
       continue;
     ++same_fiber;
-    // Three edges of a voxel (5 um): a ray may enter through a corner that the fiber does not reach.
-    EXPECT_NEAR(fibers.depth[k], volume.depth[k], 0.02);
+    // Two edges of a voxel (5 um); near the silhouette a ray may pass the last voxel centre and meet the fiber's next copy.
+    near += std::abs(fibers.depth[k] - volume.depth[k]) < 0.01;
   }
   EXPECT_GT(both, 48 * 48 / 2);
   EXPECT_GT(same_fiber, 0.85 * both);
+  EXPECT_GT(near, 0.97 * same_fiber);
 }
 
 TEST(PrecomputedRendererEndToEnd, SameBytesForAnyThreadsAndCrop) {
