@@ -27,8 +27,7 @@ SgVisibility fit_sgs(const VisibilityMaps& maps, const VisibilitySettings& setti
     if (maps.sees_nothing[s] != 0) return;
     const Eigen::VectorXd weights = fit.weights(map, turned_columns);
     for (std::size_t q = 0; q < lobes; ++q) {
-      visibility.weights[s * lobes + q] =
-          half_from_float(static_cast<float>(weights[static_cast<Eigen::Index>(q)]));
+      visibility.weights[s * lobes + q] = half_from_float(static_cast<float>(weights[static_cast<Eigen::Index>(q)]));
     }
   });
   return visibility;

@@ -30,8 +30,7 @@ constexpr double kSmallestComponent = 1e-5;
 using Samples = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;  // [segment][cell]
 
 /// Segments that see something, `count` of them at random; all where there are no more. Ascending.
-std::vector<std::uint32_t> choose_segments(const VisibilityMaps& maps, std::size_t count,
-                                           std::uint64_t seed) {
+std::vector<std::uint32_t> choose_segments(const VisibilityMaps& maps, std::size_t count, std::uint64_t seed) {
   std::vector<std::pair<std::uint64_t, std::uint32_t>> drawn;
   for (std::uint32_t s = 0; s < maps.count(); ++s) {
     if (maps.sees_nothing[s] == 0) drawn.emplace_back(RandomStream(seed, RandomStage::kPca, s, 0).bits(), s);
@@ -44,14 +43,14 @@ std::vector<std::uint32_t> choose_segments(const VisibilityMaps& maps, std::size
   return chosen;
 }
 
-/// Limited signed distances of one map, [row][column] of the first `rows` rows; `all` is scratch.
+/// Limited signed distances of one map, [row][column].
 class LimitedDistance {
  public:
   LimitedDistance() : transform_(kN) {}
-  void operator()(const SphericalMap& map, std::vector<float>& all) const {
-    all.resize(static_cast<std::size_t>(kN) * kN);
-    transform_(map, all.data());
-    for (float& d : all) d = std::clamp(d, -kLargestDistance, kLargestDistance);
+  void operator()(const SphericalMap& map, std::vector<float>& distance) const {
+    distance.resize(static_cast<std::size_t>(kN) * kN);
+    transform_(map, distance.data());
+    for (float& d : distance) d = std::clamp(d, -kLargestDistance, kLargestDistance);
   }
 
  private:
@@ -59,24 +58,22 @@ class LimitedDistance {
 };
 
 /// The leading `count` eigenvectors of a positive semidefinite matrix, and their eigenvalues, largest first.
-std::pair<Eigen::MatrixXd, Eigen::VectorXd> leading_eigenvectors(const Eigen::MatrixXd& matrix,
-                                                                 Eigen::Index count, std::uint64_t seed) {
+std::pair<Eigen::MatrixXd, Eigen::VectorXd> leading_eigenvectors(const Eigen::MatrixXd& matrix, Eigen::Index count,
+                                                                 std::uint64_t seed) {
   const Eigen::Index vectors = std::min(count + kExtraVectors, matrix.rows());
   RandomStream random(seed, RandomStage::kPca, 0, 1);
   Eigen::MatrixXd basis =
       Eigen::MatrixXd::NullaryExpr(matrix.rows(), vectors, [&] { return random.uniform_double() - 0.5; });
+  Eigen::MatrixXd orthonormal;
   for (int round = 0; round < kRounds; ++round) {
     const Eigen::HouseholderQR<Eigen::MatrixXd> qr(basis);
-    const Eigen::MatrixXd orthonormal = qr.householderQ() * Eigen::MatrixXd::Identity(matrix.rows(), vectors);
-    basis = matrix * orthonormal;
-    if (round + 1 == kRounds) {
-      const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(orthonormal.transpose() * basis);
-      const Eigen::Index kept = std::min(count, vectors);
-      return {orthonormal * solver.eigenvectors().rowwise().reverse().leftCols(kept),
-              solver.eigenvalues().reverse().head(kept)};
-    }
+    orthonormal = qr.householderQ() * Eigen::MatrixXd::Identity(matrix.rows(), vectors);
+    basis.noalias() = matrix * orthonormal;
   }
-  return {};
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(orthonormal.transpose() * basis);
+  const Eigen::Index kept = std::min(count, vectors);
+  return {orthonormal * solver.eigenvectors().rowwise().reverse().leftCols(kept),
+          solver.eigenvalues().reverse().head(kept)};
 }
 
 }  // namespace
@@ -106,11 +103,9 @@ SsdfVisibility fit_ssdf(const VisibilityMaps& maps, const VisibilitySettings& se
   tbb::parallel_for(Eigen::Index{0}, count, [&](Eigen::Index i) {
     std::vector<float> distance;
     limited_distance(maps.map(chosen[static_cast<std::size_t>(i)]), distance);
-    samples.row(i) =
-        Eigen::Map<const Eigen::RowVectorXf>(distance.data(), static_cast<Eigen::Index>(all_cells));
+    samples.row(i) = Eigen::Map<const Eigen::RowVectorXf>(distance.data(), static_cast<Eigen::Index>(all_cells));
   });
-  const Eigen::RowVectorXf mean =
-      (samples.cast<double>().colwise().sum() / static_cast<double>(count)).cast<float>();
+  const Eigen::RowVectorXf mean = (samples.cast<double>().colwise().sum() / static_cast<double>(count)).cast<float>();
   std::copy(mean.data(), mean.data() + all_cells, ssdf.mean.begin());
 
   // Principal components of the weighted deviations, by way of their products with each other.
@@ -133,8 +128,7 @@ SsdfVisibility fit_ssdf(const VisibilityMaps& maps, const VisibilitySettings& se
   Samples projection = Samples::Zero(cells, static_cast<Eigen::Index>(components));
   for (Eigen::Index k = 0; k < vectors.cols(); ++k) {
     if (variances[k] <= kSmallestComponent * kSmallestComponent * variances[0]) break;
-    const Eigen::VectorXf unit =
-        weighted.transpose() * (vectors.col(k) / std::sqrt(variances[k])).cast<float>().eval();
+    const Eigen::VectorXf unit = weighted.transpose() * (vectors.col(k) / std::sqrt(variances[k])).cast<float>().eval();
     for (Eigen::Index cell = 0; cell < cells; ++cell) {
       ssdf.basis[static_cast<std::size_t>(cell) * components + static_cast<std::size_t>(k)] =
           unit[cell] / root_weight[cell];

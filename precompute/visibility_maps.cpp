@@ -100,8 +100,7 @@ class MapTracer {
                     std::round(offset.y() / exemplar.height_mm) * exemplar.height_mm, 0);
     const int hit_piece = static_cast<int>(exemplar.segment_point[hit.segment] - first);
     for (const int step : {1, -1}) {
-      for (int piece = step > 0 ? hit_piece : hit_piece - 1; std::abs(piece - hit_piece) < pieces;
-           piece += step) {
+      for (int piece = step > 0 ? hit_piece : hit_piece - 1; std::abs(piece - hit_piece) < pieces; piece += step) {
         const int turns = piece >= 0 ? piece / pieces : -((pieces - 1 - piece) / pieces);
         const auto point = first + static_cast<std::uint32_t>(piece - turns * pieces);
         const Vec3 shift = copy + static_cast<float>(turns) * period - origin_;
@@ -166,8 +165,8 @@ class MapTracer {
         // axis, at distance |skew| / sqrt(denominator), ahead of the origin where to_begin + s along > 0.
         const float denominator = axis_axis - along * along;
         const float numerator = to_begin * along - begin_axis;
-        const int side = (skew * skew < square * denominator) & (numerator >= 0) &
-                         (numerator <= denominator) & (to_begin * denominator + numerator * along > 0);
+        const int side = (skew * skew < square * denominator) & (numerator >= 0) & (numerator <= denominator) &
+                         (to_begin * denominator + numerator * along > 0);
         const int begin_ball = (to_begin > 0) & (to_begin * to_begin > begin_free);
         const int end_ball = (to_end > 0) & (to_end * to_end > end_free);
         closed[c] |= side | begin_ball | end_ball;
@@ -215,16 +214,15 @@ VisibilityMaps bake_visibility_maps(const TileScene& scene, const SegmentOrigins
   maps.both_sides = both_sides;
   maps.sees_nothing.resize(last - first);
   maps.words.resize(maps.count() * maps.words_per_map(), 0);
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, maps.count(), 16),
-                    [&](const tbb::blocked_range<std::size_t>& range) {
-                      MapTracer tracer(scene, directions, both_sides);
-                      for (std::size_t i = range.begin(); i < range.end(); ++i) {
-                        const std::uint32_t segment = first + static_cast<std::uint32_t>(i);
-                        const bool any_open = tracer.trace(segment, origins.position[segment],
-                                                           &maps.words[i * maps.words_per_map()]);
-                        maps.sees_nothing[i] = any_open ? 0 : 1;
-                      }
-                    });
+  tbb::parallel_for(
+      tbb::blocked_range<std::size_t>(0, maps.count(), 16), [&](const tbb::blocked_range<std::size_t>& range) {
+        MapTracer tracer(scene, directions, both_sides);
+        for (std::size_t i = range.begin(); i < range.end(); ++i) {
+          const std::uint32_t segment = first + static_cast<std::uint32_t>(i);
+          const bool any_open = tracer.trace(segment, origins.position[segment], &maps.words[i * maps.words_per_map()]);
+          maps.sees_nothing[i] = any_open ? 0 : 1;
+        }
+      });
   return maps;
 }
 
@@ -244,8 +242,7 @@ VisibilityMaps read_visibility_maps(const std::filesystem::path& path) {
   const TensorFile file = TensorFile::read(path);
   VisibilityMaps maps;
   const std::string& sides = file.metadata_value("light_from");
-  if (sides != "face" && sides != "both")
-    throw FileError(path.string() + ": light_from is neither face nor both");
+  if (sides != "face" && sides != "both") throw FileError(path.string() + ": light_from is neither face nor both");
   maps.both_sides = sides == "both";
   maps.first_segment = file.get<std::uint32_t>("first_segment", {1})[0];
   maps.words = file.get<std::uint64_t>("maps", {0, maps.words_per_map()});

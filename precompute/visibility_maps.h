@@ -1,18 +1,17 @@
 #ifndef HEDDLE_PRECOMPUTE_VISIBILITY_MAPS_H_
 #define HEDDLE_PRECOMPUTE_VISIBILITY_MAPS_H_
-// Which directions are open from the origin of each segment (fibers/tracing/segment_origins.h), on the
-// endless flat cloth: 128 x 128 lat-long cells, one ray through the centre of each, the segment's own fiber
-// ignored in every copy of the tile (Khungurn 2017, section 4.1, where the origin is the midpoint of the
-// axis).
+// Which directions are open from the origin of each segment (fibers/tracing/segment_origins.h), on the endless flat cloth:
+// 128 x 128 lat-long cells, one ray through the centre of each, the segment's own fiber ignored in every copy of the tile
+// (Khungurn 2017, section 4.1, where the origin is the midpoint of the axis).
 //
-// Light from the face only: only the cells of the upper hemisphere are traced, the lower half counts as
-// closed. So it does in everything fitted to these maps, signed distances and Gaussians alike.
+// Light from the face only: only the cells of the upper hemisphere are traced, the lower half counts as closed. So it
+// does in everything fitted to these maps, signed distances and Gaussians alike.
 //
-// Rays are saved without changing the result: where a ray hits, the fiber around the hit is projected onto
-// the map, and all cells whose ray passes within its radius (less a margin for rounding) are closed without a
-// ray of their own. A map costs about one ray per open cell and one per piece of fiber seen; a segment that
-// sees nothing costs only the latter. A segment's map depends on that segment alone, so it is the same for
-// any range and number of threads. Tested in tests/precompute/visibility_maps_test.cpp.
+// Rays are saved without changing the result: where a ray hits, the fiber around the hit is projected onto the map, and all
+// cells whose ray passes within its radius (less a margin for rounding) are closed without a ray of their own. A map
+// costs about one ray per open cell and one per piece of fiber seen; a segment that sees nothing costs only the latter.
+// A segment's map depends on that segment alone, so it is the same for any range and number of threads.
+// Tested in tests/precompute/visibility_maps_test.cpp.
 
 #include <cstddef>
 #include <cstdint>
@@ -32,8 +31,8 @@ struct VisibilityMaps {
   static constexpr int kResolution = 128;
 
   std::uint32_t first_segment = 0;
-  bool both_sides = false;           // otherwise only the upper half is stored, and the lower half is closed
-  std::vector<std::uint64_t> words;  // [segment][words_per_map()], bits as in SphericalMap
+  bool both_sides = false;                 // otherwise only the upper half is stored, and the lower half is closed
+  std::vector<std::uint64_t> words;        // [segment][words_per_map()], bits as in SphericalMap
   std::vector<std::uint8_t> sees_nothing;  // [segment] 1 where no cell is open
 
   std::size_t count() const { return sees_nothing.size(); }

@@ -16,13 +16,12 @@ VisibilitySettings read_visibility_settings(const TomlTable& section, bool both_
                       : axes == "sphere" ? FibonacciSet::kSphere
                                          : FibonacciSet::kHemisphere;
   if (both_sides && settings.sgs.axes != FibonacciSet::kSphere) {
-    section.fail("sg_axes",
-                 "expected \"sphere\": light comes from both sides, and these axes lie above the horizon");
+    section.fail("sg_axes", "expected \"sphere\": light comes from both sides, and these axes lie above the horizon");
   }
-  settings.sgs.sharpness = section.number("sg_sharpness", {.min = 1, .max = 1000}, both_sides ? 24.0 : 48.0);
-  settings.sgs.weights = section.choice("sg_weights", {"nnls", "voronoi"}, "nnls") == "voronoi"
-                             ? SgWeights::kVoronoi
-                             : SgWeights::kNnls;
+  settings.sgs.sharpness =
+      section.number("sg_sharpness", {.min = 1, .max = 1000}, default_sg_sharpness(settings.sgs.axes));
+  settings.sgs.weights =
+      section.choice("sg_weights", {"nnls", "voronoi"}, "nnls") == "voronoi" ? SgWeights::kVoronoi : SgWeights::kNnls;
   return settings;
 }
 

@@ -46,7 +46,7 @@ PathTracer::Sample PathTracer::radiance(const ClothTrace::Vertex& vertex, const 
       Rgb value = throughput * incoming.weight * bcsdf.evaluate(local_in, local_out) * cosine;
       if (!(value.maxCoeff() > 0)) continue;
       if (settings_.estimator == LightEstimator::kCombined && !light.is_directional()) {
-        value *= power_heuristic(incoming.pdf, bcsdf.pdf(local_in, local_out));
+        value *= power_heuristic(incoming.pdf, bcsdf.pdf(local_in, local_out, throughput));
       }
       if (!trace_.escapes(at, incoming.direction)) continue;
       (scattering == 1 ? sample.single : sample.multiple) += value;

@@ -32,12 +32,12 @@ void check_flags(const TensorFile& file, const std::vector<std::uint8_t>& flags)
 }
 
 /// The middle extents of a tensor's shape, checked to lie in a sane range.
-std::uint64_t checked_extent(const TensorFile& file, const std::string& name, std::size_t rank,
-                             std::size_t axis, std::uint64_t min, std::uint64_t max) {
+std::uint64_t checked_extent(const TensorFile& file, const std::string& name, std::size_t rank, std::size_t axis,
+                             std::uint64_t min, std::uint64_t max) {
   const std::vector<std::uint64_t>& shape = file.shape(name);
   if (shape.size() != rank || shape[axis] < min || shape[axis] > max) {
-    throw FileError(fmt::format("{}: expected {} with {} axes, axis {} from {} to {} long",
-                                file.path().string(), name, rank, axis, min, max));
+    throw FileError(fmt::format("{}: expected {} with {} axes, axis {} from {} to {} long", file.path().string(), name,
+                                rank, axis, min, max));
   }
   return shape[axis];
 }
@@ -159,8 +159,7 @@ SgVisibility read_sg_visibility(const std::filesystem::path& path) {
   visibility.rotation = file.get<Half>("rotation", {0});
   visibility.sees_nothing = file.get<std::uint8_t>("sees_nothing", {0});
   if (visibility.rotation.size() != segments || visibility.sees_nothing.size() != segments) {
-    throw FileError(path.string() +
-                    ": weights, rotation and sees_nothing differ in their number of segments");
+    throw FileError(path.string() + ": weights, rotation and sees_nothing differ in their number of segments");
   }
   check_flags(file, visibility.sees_nothing);
   return visibility;

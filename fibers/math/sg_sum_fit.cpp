@@ -29,9 +29,8 @@ SgSumFit::SgSumFit(int resolution, const SgSumShape& shape)
     for (int row = 0; row < rows_; ++row) {
       for (int column = 0; column < resolution; ++column) {
         const Vec3d centre = grid.centre(row, column);
-        const auto nearest =
-            std::max_element(axes_.begin(), axes_.end(),
-                             [&](const Vec3d& a, const Vec3d& b) { return a.dot(centre) < b.dot(centre); });
+        const auto nearest = std::max_element(
+            axes_.begin(), axes_.end(), [&](const Vec3d& a, const Vec3d& b) { return a.dot(centre) < b.dot(centre); });
         nearest_axis_.push_back(static_cast<int>(nearest - axes_.begin()));
       }
     }
@@ -42,8 +41,8 @@ SgSumFit::SgSumFit(int resolution, const SgSumShape& shape)
     for (int column = 0; column < resolution; ++column) {
       const Vec3d centre = grid.centre(row, column);
       for (int q = 0; q < shape.count; ++q) {
-        projection_(q, row * resolution + column) = static_cast<float>(
-            grid.solid_angle(row) * normalised_overlap(axes_[q], shape.sharpness, centre, kBlur));
+        projection_(q, row * resolution + column) =
+            static_cast<float>(grid.solid_angle(row) * normalised_overlap(axes_[q], shape.sharpness, centre, kBlur));
       }
     }
   }
@@ -63,8 +62,7 @@ Eigen::VectorXd SgSumFit::weights(const SphericalMap& map, int turned_columns) c
     row_sum.setZero();
     for (int column = 0; column < resolution_; ++column) {
       if (!map.open(row, column)) continue;
-      const int unturned =
-          column >= turned_columns ? column - turned_columns : column - turned_columns + resolution_;
+      const int unturned = column >= turned_columns ? column - turned_columns : column - turned_columns + resolution_;
       const int cell = row * resolution_ + unturned;
       if (method_ == SgWeights::kVoronoi) {
         sum[nearest_axis_[static_cast<std::size_t>(cell)]] += map.grid().solid_angle(row);
@@ -90,8 +88,7 @@ double sg_sum_integral(const std::vector<Vec3d>& axes, const Eigen::VectorXd& we
                        const Vec3d& direction, double light_sharpness) {
   double sum = 0;
   for (std::size_t q = 0; q < axes.size(); ++q) {
-    sum += weights[static_cast<Eigen::Index>(q)] *
-           normalised_overlap(axes[q], sharpness, direction, light_sharpness);
+    sum += weights[static_cast<Eigen::Index>(q)] * normalised_overlap(axes[q], sharpness, direction, light_sharpness);
   }
   return sum;
 }

@@ -1,15 +1,14 @@
 #ifndef HEDDLE_FIBERS_MATH_SG_SUM_FIT_H_
 #define HEDDLE_FIBERS_MATH_SG_SUM_FIT_H_
-// Fits a binary map on the sphere by a sum of normalised spherical Gaussians of one sharpness about Fibonacci
-// axes: V(w) ~ sum over q of weight[q] G(w; axis[q], sharpness) / M(sharpness), weights in steradians, never
-// negative.
+// Fits a binary map on the sphere by a sum of normalised spherical Gaussians of one sharpness about Fibonacci axes:
+// V(w) ~ sum over q of weight[q] G(w; axis[q], sharpness) / M(sharpness), weights in steradians, never negative.
 //
-// kVoronoi is Khungurn 2017, section 4.1: a weight is the open solid angle that is nearer to its axis than to
-// any other. kNnls is the non-negative least-squares fit, over the whole sphere, of V blurred by a Gaussian
-// of sharpness kBlur: soft lights see no finer detail, and all integrals have closed forms. Errors of both:
-// docs/performance.md, "Visibility". Axes of the upper hemisphere stand for light from the face only: cells
-// whose centre lies below the horizon then count as closed. The axes may be turned about +z by whole columns.
-// Tested in tests/math/sg_sum_fit_test.cpp.
+// kVoronoi is Khungurn 2017, section 4.1: a weight is the open solid angle that is nearer to its axis than to any other.
+// kNnls is the non-negative least-squares fit, over the whole sphere, of V blurred by a Gaussian of sharpness kBlur: lights
+// that use the sum see little finer detail, and all integrals have closed forms. A stronger blur (30) costs a quarter to
+// a half more error on maps of real fabrics. Errors of all choices: docs/performance.md, "Visibility".
+// Axes of the upper hemisphere stand for light from the face only: cells whose centre is not above the horizon then count
+// as closed. The axes may be turned about +z by whole columns. Tested in tests/math/sg_sum_fit_test.cpp.
 
 #include <vector>
 
@@ -23,10 +22,15 @@ namespace heddle {
 
 enum class SgWeights { kVoronoi, kNnls };
 
+/// The sharpness that suits 48 axes: they lie farther apart on the whole sphere.
+constexpr double default_sg_sharpness(FibonacciSet axes) {
+  return axes == FibonacciSet::kSphere ? 28 : 40;
+}
+
 struct SgSumShape {
   FibonacciSet axes = FibonacciSet::kHemisphere;
   int count = 48;
-  double sharpness = 48;
+  double sharpness = default_sg_sharpness(FibonacciSet::kHemisphere);
   SgWeights weights = SgWeights::kNnls;
 };
 
@@ -47,9 +51,8 @@ class SgSumFit {
   int resolution_;
   int rows_;  // rows that count
   std::vector<Vec3d> axes_;
-  std::vector<int> nearest_axis_;  // [row][column], kVoronoi
-  Eigen::Array<float, Eigen::Dynamic, Eigen::Dynamic>
-      projection_;  // [lobe, cell], kNnls: what an open cell adds
+  std::vector<int> nearest_axis_;                                   // [row][column], kVoronoi
+  Eigen::Array<float, Eigen::Dynamic, Eigen::Dynamic> projection_;  // [lobe, cell], kNnls: what an open cell adds
   Eigen::MatrixXd gram_;
 };
 

@@ -48,12 +48,10 @@ ExactSignedDistance::ExactSignedDistance(SphericalMap map) : map_(std::move(map)
     for (int column = 0; column < n; ++column) {
       const int previous = column == 0 ? n - 1 : column - 1;
       if (map_.open(row, column) != map_.open(row, previous)) {
-        sides_.push_back(
-            {false, column * grid.column_step(), row * grid.row_step(), (row + 1) * grid.row_step()});
+        sides_.push_back({false, column * grid.column_step(), row * grid.row_step(), (row + 1) * grid.row_step()});
       }
       if (row > 0 && map_.open(row, column) != map_.open(row - 1, column)) {
-        sides_.push_back(
-            {true, row * grid.row_step(), column * grid.column_step(), (column + 1) * grid.column_step()});
+        sides_.push_back({true, row * grid.row_step(), column * grid.column_step(), (column + 1) * grid.column_step()});
       }
     }
   }
@@ -76,8 +74,7 @@ double ExactSignedDistance::operator()(const Vec3d& direction) const {
       // The nearer to the foot of the perpendicular, the nearer on the sphere.
       const double between = azimuth - side.fixed;
       const double foot = std::atan2(std::sin(polar) * std::cos(between), std::cos(polar));
-      const double nearer_end =
-          circular(foot - side.begin) < circular(foot - side.end) ? side.begin : side.end;
+      const double nearer_end = circular(foot - side.begin) < circular(foot - side.end) ? side.begin : side.end;
       const double at = foot > side.begin && foot < side.end ? foot : nearer_end;
       nearest = std::min(nearest, squared_chord(polar, at, between));
     }
@@ -201,11 +198,9 @@ void SignedDistanceTransform::operator()(const SphericalMap& map, float* distanc
         const float product = product_[row * (un + 1) + parallels[i]];
         const float* const azimuth = &nearest_azimuth[i * un + begin];
         if (width == kBlock) {
-          for (std::size_t c = 0; c < kBlock; ++c)
-            nearest[c] = std::min(nearest[c], polar + product * azimuth[c]);
+          for (std::size_t c = 0; c < kBlock; ++c) nearest[c] = std::min(nearest[c], polar + product * azimuth[c]);
         } else {
-          for (std::size_t c = 0; c < width; ++c)
-            nearest[c] = std::min(nearest[c], polar + product * azimuth[c]);
+          for (std::size_t c = 0; c < width; ++c) nearest[c] = std::min(nearest[c], polar + product * azimuth[c]);
         }
       }
       std::copy(nearest, nearest + width, distance + row * un + begin);
@@ -221,8 +216,7 @@ void SignedDistanceTransform::operator()(const SphericalMap& map, float* distanc
       // Meridians on either side of column c: c - offset and c + 1 + offset.
       const float* const left = &meridian_side[foot_row * padded + margin - offset];
       const float* const right = &meridian_side[foot_row * padded + margin + 1 + offset];
-      for (std::size_t c = 0; c < un; ++c)
-        nearest[c] = std::min(nearest[c], foot + std::min(left[c], right[c]));
+      for (std::size_t c = 0; c < un; ++c) nearest[c] = std::min(nearest[c], foot + std::min(left[c], right[c]));
     }
     const std::uint8_t* const cells = &open[row * un];
     for (std::size_t c = 0; c < un; ++c) {

@@ -1,11 +1,10 @@
 #ifndef HEDDLE_FIBERS_MATH_SPHERICAL_MAP_H_
 #define HEDDLE_FIBERS_MATH_SPHERICAL_MAP_H_
-// Binary function on the sphere, constant on the cells of a lat-long grid, as packed bits: which directions
-// are open.
+// Binary function on the sphere, constant on the cells of a lat-long grid, as packed bits: which directions are open.
 //
-// N x N cells: row r holds polar angles from pi r / N to pi (r + 1) / N measured from +z, column c azimuths
-// atan2(y, x) in [2 pi c / N, 2 pi (c + 1) / N). Cell (r, c) is bit r N + c, least significant bit of each
-// word first. N is at least 4. Tested in tests/math/spherical_map_test.cpp.
+// N x N cells: row r holds polar angles from pi r / N to pi (r + 1) / N measured from +z, column c azimuths atan2(y, x) in
+// [2 pi c / N, 2 pi (c + 1) / N). Cell (r, c) is bit r N + c, least significant bit of each word first.
+// Tested in tests/math/spherical_map_test.cpp.
 
 #include <algorithm>
 #include <cassert>
@@ -27,7 +26,7 @@ class LatLongGrid {
     int column;
   };
 
-  explicit LatLongGrid(int resolution) : resolution_(resolution) { assert(resolution >= 4); }
+  explicit LatLongGrid(int resolution) : resolution_(resolution) { assert(resolution >= 1); }
 
   int resolution() const { return resolution_; }
   std::size_t cell_count() const { return static_cast<std::size_t>(resolution_) * resolution_; }
@@ -90,9 +89,7 @@ class SphericalMap {
   }
 
  private:
-  std::size_t index(int row, int column) const {
-    return static_cast<std::size_t>(row) * grid_.resolution() + column;
-  }
+  std::size_t index(int row, int column) const { return static_cast<std::size_t>(row) * grid_.resolution() + column; }
   LatLongGrid grid_;
   std::vector<std::uint64_t> words_;
 };

@@ -15,8 +15,7 @@ namespace {
 
 constexpr float kHalfPi = 0.5F * kPif;
 constexpr int kEndRows = 512;
-constexpr double kEndReach =
-    6.5;  // deviations from an end beyond which the cut leaves Gn as it is (to 1e-10)
+constexpr double kEndReach = 6.5;  // deviations from an end beyond which the cut leaves Gn as it is (to 1e-10)
 
 // I0(x) exp(-x) sqrt(1 + 2 pi x) over t = x / (x + 2): between 0.9 and 1.1 everywhere, so linear
 // interpolation keeps 1e-6.
@@ -26,8 +25,7 @@ class BesselTable {
     for (int k = 0; k < kEntries; ++k) {
       const double t = static_cast<double>(k) / kEntries;
       const double x = 2.0 * t / (1.0 - t);
-      values_[static_cast<std::size_t>(k)] =
-          static_cast<float>(scaled_bessel_i0(x) * std::sqrt(1.0 + 2.0 * kPi * x));
+      values_[static_cast<std::size_t>(k)] = static_cast<float>(scaled_bessel_i0(x) * std::sqrt(1.0 + 2.0 * kPi * x));
     }
     values_[kEntries] = values_[kEntries + 1] = 1.0F;
   }
@@ -126,8 +124,8 @@ BcsdfTable::LongitudinalLobe BcsdfTable::longitudinal_lobe(double beta) {
   for (int k = 0; k <= kEndRows; ++k) {
     const double from_end = reach * k / kEndRows;
     const double cosine = std::sin(from_end);
-    lobe.end_ratio[static_cast<std::size_t>(k)] = static_cast<float>(
-        gaussian_cos2_mean(0.5 * kPi - from_end, beta) / (floor + decay * cosine * cosine));
+    lobe.end_ratio[static_cast<std::size_t>(k)] =
+        static_cast<float>(gaussian_cos2_mean(0.5 * kPi - from_end, beta) / (floor + decay * cosine * cosine));
   }
   return lobe;
 }
@@ -137,7 +135,8 @@ BcsdfTable::BcsdfTable(const FiberScattering& fiber)
       color_r_(fiber.color_r.cast<float>()),
       color_tt_(fiber.color_tt.cast<float>()),
       azimuth_sampler_(fiber.isotropic_white ? 0.0 : 1.0 / (fiber.gamma_tt * fiber.gamma_tt)),
-      probability_of_r_(kRows, 1.0F) {
+      adjoint_r_(kRows, Rgb::Ones()),
+      adjoint_tt_(kRows, Rgb::Zero()) {
   if (!fiber.isotropic_white) {
     r_ = longitudinal_lobe(fiber.beta_r);
     tt_ = longitudinal_lobe(fiber.beta_tt);
@@ -162,24 +161,26 @@ BcsdfTable::BcsdfTable(const FiberScattering& fiber)
         for (int c = 0; c < 3; ++c) {
           const auto value = static_cast<float>(r[j][c] + tt[j][c]);
           sh_[(static_cast<std::size_t>(row) * kCount + j) * 3 + static_cast<std::size_t>(c)] = value;
-          sh_[(static_cast<std::size_t>(mirrored) * kCount + j) * 3 + static_cast<std::size_t>(c)] =
-              sign * value;
+          sh_[(static_cast<std::size_t>(mirrored) * kCount + j) * 3 + static_cast<std::size_t>(c)] = sign * value;
         }
       }
     }
     // Adjoint albedos are sqrt(4 pi) times the constant coefficients.
-    const double share_r = r[0].maxCoeff();
-    const double share_tt = tt[0].maxCoeff();
-    const double probability = share_r + share_tt > 0.0 ? share_r / (share_r + share_tt) : 0.5;
-    probability_of_r_[static_cast<std::size_t>(row)] = static_cast<float>(probability);
-    probability_of_r_[static_cast<std::size_t>(mirrored)] = static_cast<float>(probability);
+    for (const int at : {row, mirrored}) {
+      adjoint_r_[static_cast<std::size_t>(at)] = r[0].cast<float>();
+      adjoint_tt_[static_cast<std::size_t>(at)] = tt[0].cast<float>();
+    }
   }
 }
 
-float BcsdfTable::probability_of_r(float theta_o) const {
+float BcsdfTable::probability_of_r(float theta_o, const Rgb& importance) const {
   const RowPosition at = row_position(theta_o);
-  const float* p = &probability_of_r_[static_cast<std::size_t>(at.row)];
-  return p[0] + at.fraction * (p[1] - p[0]);
+  const auto row = static_cast<std::size_t>(at.row);
+  const Rgb r = adjoint_r_[row] + at.fraction * (adjoint_r_[row + 1] - adjoint_r_[row]);
+  const Rgb tt = adjoint_tt_[row] + at.fraction * (adjoint_tt_[row + 1] - adjoint_tt_[row]);
+  const float share_r = (importance * r).sum();
+  const float share = share_r + (importance * tt).sum();
+  return share > 0.0F ? share_r / share : 0.5F;
 }
 
 BcsdfTable::Densities BcsdfTable::densities(const Inclination& in, const Inclination& out) const {
@@ -187,8 +188,7 @@ BcsdfTable::Densities BcsdfTable::densities(const Inclination& in, const Inclina
   const float half_square = -0.5F * deviation * deviation;
   return {r_.norm * std::exp(half_square * r_.inverse_variance) * (0.5F / kPif),
           tt_.norm * azimuth_norm_ *
-              std::exp(half_square * tt_.inverse_variance -
-                       0.5F * k_ * (in.azimuth + out.azimuth).squaredNorm())};
+              std::exp(half_square * tt_.inverse_variance - 0.5F * k_ * (in.azimuth + out.azimuth).squaredNorm())};
 }
 
 Rgb BcsdfTable::value(const Densities& d, const Inclination& in) const {
@@ -198,12 +198,11 @@ Rgb BcsdfTable::value(const Densities& d, const Inclination& in) const {
   return color_r_ * r + (1.0F - color_r_) * (schlick * r + (1.0F - schlick) * tt * color_tt_);
 }
 
-float BcsdfTable::sampling_density(const Densities& d, const Inclination& out) const {
+float BcsdfTable::sampling_density(const Densities& d, const Inclination& out, float probability_of_r) const {
   // Share of the Gaussian about -theta_o inside [-pi/2, pi/2]; five deviations from the ends it is 1 to 3e-7.
   const float mass_r = out.from_end < 5.0F * r_.beta ? cut_gaussian_mass(out.theta, r_.beta) : 1.0F;
   const float mass_tt = out.from_end < 5.0F * tt_.beta ? cut_gaussian_mass(out.theta, tt_.beta) : 1.0F;
-  const float probability = probability_of_r(out.theta);
-  return probability / mass_r * d.r + (1.0F - probability) / mass_tt * d.tt;
+  return probability_of_r / mass_r * d.r + (1.0F - probability_of_r) / mass_tt * d.tt;
 }
 
 Rgb BcsdfTable::evaluate(const Vec3& wi, const Vec3& wo) const {
@@ -212,15 +211,16 @@ Rgb BcsdfTable::evaluate(const Vec3& wi, const Vec3& wo) const {
   return value(densities(in, Inclination(wo)), in);
 }
 
-float BcsdfTable::pdf(const Vec3& wi, const Vec3& wo) const {
+float BcsdfTable::pdf(const Vec3& wi, const Vec3& wo, const Rgb& importance) const {
   const Inclination in(wi);
   if (fiber_.isotropic_white) return in.cosine / (kPif * kPif);
   const Inclination out(wo);
   // Exactly along the tangent the density is infinite: capped at the cosine that float can tell from 0.
-  return sampling_density(densities(in, out), out) / std::max(in.cosine, 1e-7F);
+  return sampling_density(densities(in, out), out, probability_of_r(out.theta, importance)) /
+         std::max(in.cosine, 1e-7F);
 }
 
-BcsdfTable::Sample BcsdfTable::sample(const Vec3& wo, RandomStream& random) const {
+BcsdfTable::Sample BcsdfTable::sample(const Vec3& wo, RandomStream& random, const Rgb& importance) const {
   if (fiber_.isotropic_white) {
     // Density cos(theta) / pi^2: x has that of a coordinate of a uniform point in the disk, the azimuth is
     // uniform.
@@ -230,7 +230,8 @@ BcsdfTable::Sample BcsdfTable::sample(const Vec3& wo, RandomStream& random) cons
     return {Vec3(x, cosine * std::cos(phi), cosine * std::sin(phi)), Rgb::Ones(), cosine / (kPif * kPif)};
   }
   const Inclination out(wo);
-  const bool is_r = random.uniform() < probability_of_r(out.theta);
+  const float probability = probability_of_r(out.theta, importance);
+  const bool is_r = random.uniform() < probability;
   const float theta = sample_cut_gaussian(-out.theta, is_r ? r_.beta : tt_.beta, random);
   const float turn = is_r ? 2.0F * kPif * random.uniform() : azimuth_sampler_.sample(random);
   // TT's azimuths scatter about that opposite to wo's.
@@ -239,7 +240,8 @@ BcsdfTable::Sample BcsdfTable::sample(const Vec3& wo, RandomStream& random) cons
   const Inclination in(theta, Vec2(cos_turn * out.azimuth.x() - sin_turn * out.azimuth.y(),
                                    sin_turn * out.azimuth.x() + cos_turn * out.azimuth.y()));
   const Densities d = densities(in, out);
-  const float density = sampling_density(d, out);  // per d theta_i d phi_i, so pdf = density / cos(theta_i)
+  const float density =
+      sampling_density(d, out, probability);  // per d theta_i d phi_i, so pdf = density / cos(theta_i)
   return {Vec3(in.sine, in.cosine * in.azimuth.x(), in.cosine * in.azimuth.y()),
           value(d, in) * (in.cosine * in.cosine / density), density / in.cosine};
 }
@@ -274,8 +276,7 @@ Rgb BcsdfTable::sg_scatter(const Vec3& axis, float sharpness, const Vec3& wo) co
       static const QuadratureRule& base = gauss_legendre(kBroadNodes);
       for (std::size_t n = 0; n < base.nodes.size(); ++n) {
         const float theta = kHalfPi * static_cast<float>(base.nodes[n]);
-        add_node(theta - light.theta, theta + view.theta, kHalfPi * static_cast<float>(base.weights[n]),
-                 0.0F);
+        add_node(theta - light.theta, theta + view.theta, kHalfPi * static_cast<float>(base.weights[n]), 0.0F);
       }
       return;
     }
@@ -288,8 +289,7 @@ Rgb BcsdfTable::sg_scatter(const Vec3& axis, float sharpness, const Vec3& wo) co
     const ThreeNodeRule rule = cut_rule(static_cast<double>(root * (kHalfPi - std::abs(centre))));
     for (std::size_t n = 0; n < 3; ++n) {
       const auto x = static_cast<float>(rule.nodes[n]);
-      add_node(light_offset + scale * x, cone_offset + scale * x, static_cast<float>(rule.weights[n]) / root,
-               x * x);
+      add_node(light_offset + scale * x, cone_offset + scale * x, static_cast<float>(rule.weights[n]) / root, x * x);
     }
   };
   add_lobe(r_.inverse_variance);
@@ -321,8 +321,8 @@ Rgb BcsdfTable::sg_scatter(const Vec3& axis, float sharpness, const Vec3& wo) co
     // B as in sg_scatter.cpp; with k = 0 TT's azimuth integral becomes R's.
     const Lanes a = (sharpness * light.cosine) * cosine;
     const Lanes m = ((k - a).square() + difference2 * k * a).sqrt();
-    const Lanes exponent = x2 - 0.5F * inverse_variance * d_cone.square() -
-                           2.0F * sharpness * half_sine.square() - sum2 * k * a / (m + a + k).max(1e-30F);
+    const Lanes exponent = x2 - 0.5F * inverse_variance * d_cone.square() - 2.0F * sharpness * half_sine.square() -
+                           sum2 * k * a / (m + a + k).max(1e-30F);
     const Lanes t = m / (m + 2.0F);
     const Lanes value = exponent.exp() * cosine.square() / (1.0F + 2.0F * kPif * m).sqrt();
     const Lanes schlick = (1.0F - cosine).square().square() * (1.0F - cosine);

@@ -48,7 +48,7 @@ std::optional<PathEscape> walk_path(const Trace& trace, std::span<const BcsdfTab
     const Mat3 frame = frame_about(vertex.tangent);
     if (!at_vertex(vertex, frame, wo, throughput, n)) return {};
     const BcsdfTable& bcsdf = materials[vertex.material];
-    const auto sample = bcsdf.sample(frame.transpose() * wo, random);
+    const auto sample = bcsdf.sample(frame.transpose() * wo, random, throughput);
     throughput *= sample.weight;
     if (n >= limits.roulette_from) {
       const float survival = std::min(1.0F, throughput.maxCoeff());

@@ -27,7 +27,7 @@ constexpr Quantity kQuantities[] = {
     {"bcsdf_sh", eval_bcsdf_sh},     {"sg_mass", eval_sg_mass},
     {"sg_product", eval_sg_product}, {"sg_scatter", eval_sg_scatter},
     {"sg_zonal", eval_sg_zonal},     {"sh", eval_sh},
-    {"sh_rotate", eval_sh_rotate},
+    {"sh_rotate", eval_sh_rotate},   {"visibility", eval_visibility},
 };
 
 // The line is not a JSON object.

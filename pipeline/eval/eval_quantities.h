@@ -23,6 +23,9 @@ nlohmann::json eval_sg_zonal(EvalObject& request);
 nlohmann::json eval_sh(EvalObject& request);
 nlohmann::json eval_sh_rotate(EvalObject& request);
 
+// eval_visibility.cpp
+nlohmann::json eval_visibility(EvalObject& request);
+
 }  // namespace heddle
 
 #endif  // HEDDLE_PIPELINE_EVAL_EVAL_QUANTITIES_H_

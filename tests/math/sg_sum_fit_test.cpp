@@ -132,8 +132,7 @@ TEST(SgSum, IntegralIsTheValueBlurred) {
   for (int row = 0; row < n; ++row) {
     for (int column = 0; column < n; ++column) {
       const Vec3d w = grid.centre(row, column);
-      sum += grid.solid_angle(row) * sg_sum_value(axes, weights, 40, w) * sg_value({direction, 25}, w) /
-             sg_mass(25.0);
+      sum += grid.solid_angle(row) * sg_sum_value(axes, weights, 40, w) * sg_value({direction, 25}, w) / sg_mass(25.0);
     }
   }
   // Midpoint sums over cells of 0.025 rad of Gaussians of width 0.16 rad: error about (0.025 / 0.16)^2 / 24 =

@@ -1,0 +1,316 @@
+#include "render/precomputed_renderer.h"
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <cmath>
+#include <memory>
+#include <utility>
+
+#include "fibers/math/sampling.h"
+#include "formats/input_error.h"
+#include "tests/support/small_exemplars.h"
+
+namespace heddle {
+namespace {
+
+/// Data that hide nothing: every direction is open, and light reaches every fiber once more as it came from the lamp.
+FabricPack open_pack(const FiberScattering& scattering, bool both_sides = false) {
+  FabricPack pack;
+  pack.folder = "open.pack";
+  pack.exemplar = crossed_layers(scattering);
+  pack.light_from_both_sides = both_sides;
+  pack.materials.emplace_back(scattering);
+  const std::size_t segments = pack.exemplar.segment_count();
+  pack.cell_of_segment.assign(segments, 0);
+
+  SsdfVisibility ssdf;
+  ssdf.components = 1;
+  const auto texels = static_cast<std::size_t>(ssdf.resolution * ssdf.resolution);
+  ssdf.mean.assign(texels, kPif);
+  ssdf.basis.assign(texels, 0.0F);
+  ssdf.coefficients.resize(segments);
+  ssdf.sees_nothing.assign(segments, 0);
+  pack.ssdf = std::move(ssdf);
+
+  SgVisibility lobes;
+  lobes.sharpness = 48;
+  lobes.axes = {Vec3(0, 0, 1)};
+  lobes.weights.assign(segments, half_from_float(0));
+  lobes.rotation.assign(segments, half_from_float(0));
+  lobes.sees_nothing.assign(segments, 1);
+  pack.sgs = std::move(lobes);
+
+  Transfer transfer;
+  transfer.order = 0;
+  transfer.both_sides = both_sides;
+  transfer.grid = {
+      {1, 1, 1}, pack.exemplar.width_mm, pack.exemplar.height_mm, pack.exemplar.z_min, pack.exemplar.z_max};
+  transfer.matrices = {1, 1, 1};
+  transfer.standard_error = {0, 0, 0};
+  transfer.paths = {1};
+  pack.transfer = std::move(transfer);
+
+  // Straight fibers along the axes: voxels by the distance to a line.
+  IdVolume volume;
+  volume.size = {40, 50, 48};
+  volume.voxel_mm = {pack.exemplar.width_mm / 40, pack.exemplar.height_mm / 50,
+                     (pack.exemplar.z_max - pack.exemplar.z_min) / 48};
+  volume.origin_mm = {0, 0, pack.exemplar.z_min};
+  for (int z = 0; z < 48; ++z) {
+    for (int y = 0; y < 50; ++y) {
+      for (int x = 0; x < 40; ++x) {
+        const Vec3 centre = Vec3d((x + 0.5) * volume.voxel_mm[0], (y + 0.5) * volume.voxel_mm[1],
+                                  volume.origin_mm[2] + (z + 0.5) * volume.voxel_mm[2])
+                                .cast<float>();
+        std::int32_t id = -1;
+        for (std::uint32_t s = 0; s < segments; ++s) {
+          const Vec3 tangent = pack.exemplar.segment_tangent(s);
+          Vec3 offset = centre - pack.exemplar.segment_midpoint(s);
+          offset.x() -= pack.exemplar.width_mm * std::round(offset.x() / pack.exemplar.width_mm);
+          offset.y() -= pack.exemplar.height_mm * std::round(offset.y() / pack.exemplar.height_mm);
+          const float along = offset.dot(tangent);
+          const float half = 0.125F * (std::abs(tangent.x()) > 0.5F ? pack.exemplar.width_mm : pack.exemplar.height_mm);
+          if (std::abs(along) <= half && (offset - along * tangent).norm() <= 0.0175F)
+            id = static_cast<std::int32_t>(s);
+        }
+        volume.ids.push_back(id);
+      }
+    }
+  }
+  pack.volume = std::move(volume);
+  return pack;
+}
+
+Light directional(const Vec3& axis, float irradiance) {
+  return {LightType::kDirectional, axis.normalized(), 0, Rgb::Constant(irradiance)};
+}
+
+Light gaussian(const Vec3& axis, float sharpness, float irradiance) {
+  return {LightType::kSphericalGaussian, axis.normalized(), sharpness, Rgb::Constant(irradiance)};
+}
+
+/// Half of the plane z = 1 mm over the cloth: x > 0.
+TriangleMesh half_roof() {
+  return {{Vec3(0, -50, 1), Vec3(50, -50, 1), Vec3(50, 50, 1), Vec3(0, 50, 1)}, {{0, 1, 2}, {0, 2, 3}}};
+}
+
+struct World {
+  FabricPack pack;
+  std::unique_ptr<ClothScene> scene;
+  std::vector<const FabricPack*> packs;
+  std::vector<Light> lights;
+
+  PrecomputedRenderer renderer(const PrecomputedSettings& settings = {}) const {
+    return {*scene, packs, lights, Rgb(0.25F, 0.5F, 0.75F), settings};
+  }
+};
+
+std::unique_ptr<World> make_world(FabricPack pack, std::vector<Light> lights, std::vector<TriangleMesh> meshes = {}) {
+  auto world = std::make_unique<World>();
+  world->pack = std::move(pack);
+  std::vector<ClothPiece> pieces;
+  pieces.push_back({std::make_shared<TileScene>(world->pack.exemplar), flat_cloth(6, 4)});
+  world->scene = std::make_unique<ClothScene>(std::move(pieces), std::move(meshes));
+  world->packs = {&world->pack};
+  world->lights = std::move(lights);
+  return world;
+}
+
+/// Looks at the cloth from above, from under the roof; `wide` mm of it fill the width of the picture.
+Camera camera_above(double wide, int width, int height) {
+  CameraConfig config;
+  config.position = Vec3d(0.01, -0.3, 0.9);
+  config.look_at = Vec3d(0.01, 0, 0);
+  config.fov = 2 * std::atan(0.5 * wide / config.position.norm());
+  config.width = width;
+  config.height = height;
+  return Camera(config);
+}
+
+const auto kNoProgress = [](double) {};
+
+TEST(PrecomputedRendererLaw, OpenFurnaceOfWhiteFibersIsOne) {
+  // Light 1 from everywhere (irradiance 4 pi), handed on by an identity: the white isotropic fiber shows 1, in every pixel on
+  // the cloth; nothing is seen by single scattering, whose lobes are all dark.
+  const auto world = make_world(open_pack(white_isotropic(), true), {gaussian({0, 0, 1}, 0, 4 * kPif)});
+  const FrameBuffers frame = shade_picture(world->renderer(), camera_above(1, 24, 16), {0, 0, 24, 16}, 2, kNoProgress);
+  for (std::size_t k = 0; k < frame.pixel_count(); ++k) {
+    EXPECT_EQ(frame.single[k].maxCoeff(), 0);
+    if (frame.alpha[k] < 1) continue;
+    EXPECT_LT((frame.multiple[k] - 1).abs().maxCoeff(), 1e-4);
+    EXPECT_LT((frame.beauty[k] - 1).abs().maxCoeff(), 1e-4);
+  }
+}
+
+TEST(PrecomputedRenderer, SingleScatteringIsTheBcsdfAtTheFiberSeen) {
+  const FiberScattering cotton = test_cotton();
+  const Vec3 towards = Vec3(0.4F, 0.1F, 1).normalized();
+  const auto world = make_world(open_pack(cotton), {directional(towards, 2)});
+  const Camera camera = camera_above(0.02, 5, 5);  // 4 um per pixel
+  const FrameBuffers frame = shade_picture(world->renderer(), camera, {0, 0, 5, 5}, 1, kNoProgress);
+  int checked = 0;
+  for (int y = 0; y < 5; ++y) {
+    for (int x = 0; x < 5; ++x) {
+      const std::size_t k = static_cast<std::size_t>(5 * y + x);
+      if (frame.segment[k] == 0xffffffffU) continue;
+      const Vec3 tangent = world->pack.exemplar.segment_tangent(frame.segment[k]);
+      EXPECT_LT((frame.tangent[k] - tangent).norm(), 1e-5);
+      RandomStream eye(1, RandomStage::kEyeRay, static_cast<std::uint64_t>(k), 0);
+      const double px = x + eye.uniform_double();
+      const double py = y + eye.uniform_double();
+      const Vec3 wo = -camera.ray(px, py).direction;
+      const Mat3 to_fiber = frame_about(tangent).transpose();
+      const Vec3 wi = to_fiber * towards;
+      const Rgb expected = 2 * std::sqrt(1 - wi.x() * wi.x()) * world->pack.materials[0].evaluate(wi, to_fiber * wo);
+      EXPECT_LT(((frame.single[k] - expected) / expected).abs().maxCoeff(), 1e-3);
+      ++checked;
+    }
+  }
+  EXPECT_GT(checked, 15);
+}
+
+TEST(PrecomputedRendererLaw, ShadowOfARoofIsHardInSingleAndGaussianInMultipleScattering) {
+  // The roof's edge is at x = 0 and the light straight above. Share of light at x: a step, and the normal distribution
+  // function Phi(-x / sigma).
+  const auto world = make_world(open_pack(white_isotropic()), {directional({0, 0, 1}, 1)}, {half_roof()});
+  PrecomputedSettings settings;
+  settings.shadow_sigma_mm = 0.1;
+  const FrameBuffers shaded =
+      shade_picture(world->renderer(settings), camera_above(0.8, 32, 24), {0, 0, 32, 24}, 16, kNoProgress);
+  const auto open = make_world(open_pack(white_isotropic()), {directional({0, 0, 1}, 1)});
+  const FrameBuffers lit =
+      shade_picture(open->renderer(settings), camera_above(0.8, 32, 24), {0, 0, 32, 24}, 16, kNoProgress);
+  double worst = 0;
+  for (int x = 0; x < 32; ++x) {
+    double multiple = 0;
+    double multiple_lit = 0;
+    double single = 0;
+    double single_lit = 0;
+    double position = 0;
+    int pixels = 0;
+    for (int y = 0; y < 24; ++y) {
+      const std::size_t k = static_cast<std::size_t>(32 * y + x);
+      multiple += shaded.multiple[k][0];
+      multiple_lit += lit.multiple[k][0];
+      single += shaded.single[k][0];
+      single_lit += lit.single[k][0];
+      if (lit.segment[k] == 0xffffffffU) continue;
+      position += lit.fabric_position[k].x();
+      ++pixels;
+    }
+    position /= pixels;
+    const double expected = 0.5 * std::erfc(position / 0.1 / std::sqrt(2.0));
+    // 24 x 16 draws of 0 or 1, and the column's 0.025 mm, over which Phi bends by less than 0.01.
+    const double error = std::abs(multiple / multiple_lit - expected) - 0.01;
+    worst = std::max(worst, error / std::sqrt(expected * (1 - expected) / (24 * 16) + 1e-6));
+    if (std::abs(position) > 0.05) EXPECT_NEAR(single / single_lit, position < 0 ? 1 : 0, 1e-6);
+  }
+  std::printf("  worst column: %.2f standard errors\n", worst);
+  EXPECT_LT(worst, 3.5);  // of 32 columns
+}
+
+TEST(PrecomputedRenderer, LightFromBelowLeavesClothLitFromTheFaceDark) {
+  for (const bool both_sides : {false, true}) {
+    for (const Light& light : {directional({0.1F, 0, -1}, 1), gaussian({0.1F, 0, -1}, 500, 1)}) {
+      const auto world = make_world(open_pack(test_cotton(), both_sides), {light});
+      const FrameBuffers frame = shade_picture(world->renderer(), camera_above(1, 8, 8), {0, 0, 8, 8}, 2, kNoProgress);
+      float brightest = 0;
+      for (std::size_t k = 0; k < frame.pixel_count(); ++k) {
+        brightest = std::max(brightest, (frame.single[k] + frame.multiple[k]).maxCoeff());
+      }
+      EXPECT_EQ(brightest > 0, both_sides);
+    }
+  }
+}
+
+TEST(PrecomputedRenderer, BackgroundAndAlphaFillWhatTheClothLeaves) {
+  const auto world = make_world(open_pack(test_cotton()), {directional({0, 0, 1}, 1)});
+  const FrameBuffers frame = shade_picture(world->renderer(), camera_above(20, 20, 20), {0, 0, 20, 20}, 4, kNoProgress);
+  int covered = 0;
+  int empty = 0;
+  for (std::size_t k = 0; k < frame.pixel_count(); ++k) {
+    const Rgb background = (1 - frame.alpha[k]) * Rgb(0.25F, 0.5F, 0.75F);
+    EXPECT_LT((frame.beauty[k] - frame.single[k] - frame.multiple[k] - background).abs().maxCoeff(), 1e-5);
+    EXPECT_LT((frame.beauty[k] - 0.5F * (frame.half0[k] + frame.half1[k])).abs().maxCoeff(), 1e-5);
+    covered += frame.alpha[k] == 1;
+    empty += frame.alpha[k] == 0;
+    EXPECT_EQ(frame.depth[k] > 0, frame.segment[k] != 0xffffffffU);
+  }
+  EXPECT_GT(covered, 10);
+  EXPECT_GT(empty, 10);
+}
+
+TEST(PrecomputedRendererAgreement, VolumeSeesWhatFibersShow) {
+  const auto world = make_world(open_pack(test_cotton()), {directional({0.3F, 0.2F, 1}, 1)});
+  PrecomputedSettings settings;
+  settings.volume = true;
+  const Camera camera = camera_above(0.5, 48, 48);
+  const FrameBuffers fibers = shade_picture(world->renderer(), camera, {0, 0, 48, 48}, 1, kNoProgress);
+  const FrameBuffers volume = shade_picture(world->renderer(settings), camera, {0, 0, 48, 48}, 1, kNoProgress);
+  int both = 0;
+  int same_fiber = 0;
+  for (std::size_t k = 0; k < fibers.pixel_count(); ++k) {
+    if (fibers.segment[k] == 0xffffffffU || volume.segment[k] == 0xffffffffU) continue;
+    ++both;
+    if (world->pack.exemplar.segment_fiber[fibers.segment[k]] != world->pack.exemplar.segment_fiber[volume.segment[k]])
+      continue;
+    ++same_fiber;
+    // Three edges of a voxel (5 um): a ray may enter through a corner that the fiber does not reach.
+    EXPECT_NEAR(fibers.depth[k], volume.depth[k], 0.02);
+  }
+  EXPECT_GT(both, 48 * 48 / 2);
+  EXPECT_GT(same_fiber, 0.85 * both);
+}
+
+TEST(PrecomputedRendererEndToEnd, SameBytesForAnyThreadsAndCrop) {
+  const auto world = make_world(open_pack(test_cotton()),
+                                {directional({0.3F, 0.2F, 1}, 1), gaussian({-0.5F, 0, 1}, 150, 2)}, {half_roof()});
+  const Camera camera = camera_above(2, 50, 40);
+  const auto render = [&](std::size_t threads, const PixelRect& crop) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    return shade_picture(world->renderer(), camera, crop, 3, kNoProgress);
+  };
+  const FrameBuffers one = render(1, {0, 0, 50, 40});
+  const FrameBuffers two = render(2, {0, 0, 50, 40});
+  const FrameBuffers crop = render(2, {13, 7, 30, 21});
+  for (std::size_t k = 0; k < one.pixel_count(); ++k) {
+    ASSERT_TRUE((one.beauty[k] == two.beauty[k]).all() && (one.multiple[k] == two.multiple[k]).all());
+    ASSERT_EQ(one.segment[k], two.segment[k]);
+  }
+  for (int y = 0; y < 21; ++y) {
+    for (int x = 0; x < 30; ++x) {
+      const std::size_t whole = static_cast<std::size_t>((y + 7) * 50 + x + 13);
+      const std::size_t part = static_cast<std::size_t>(y * 30 + x);
+      ASSERT_TRUE((one.beauty[whole] == crop.beauty[part]).all());
+      ASSERT_TRUE((one.variance[whole] == crop.variance[part]).all());
+    }
+  }
+}
+
+TEST(PrecomputedRenderer, SaysWhatThePackLacks) {
+  const auto fails = [](FabricPack pack, const Light& light, bool volume) {
+    const auto world = make_world(std::move(pack), {light});
+    PrecomputedSettings settings;
+    settings.volume = volume;
+    EXPECT_THROW(world->renderer(settings), FileError);
+  };
+  const Light sharp = directional({0, 0, 1}, 1);
+  const Light soft = gaussian({0, 0, 1}, 20, 1);
+  FabricPack pack = open_pack(test_cotton());
+  pack.ssdf.reset();
+  make_world(pack, {soft})->renderer();
+  fails(pack, sharp, false);
+  pack = open_pack(test_cotton());
+  pack.sgs.reset();
+  make_world(pack, {sharp})->renderer();
+  fails(pack, soft, false);
+  pack = open_pack(test_cotton());
+  pack.volume.reset();
+  fails(pack, sharp, true);
+  pack.transfer.reset();
+  fails(pack, sharp, false);
+}
+
+}  // namespace
+}  // namespace heddle

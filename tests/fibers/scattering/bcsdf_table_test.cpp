@@ -136,11 +136,13 @@ TEST(BcsdfTableStatistical, MeanWeightIsTheAdjointAlbedoAndTheWorstIsSmall) {
       RunningMean mean;
       float worst_here = 0.0F;
       for (int k = 0; k < kSamples; ++k) {
-        const BcsdfTable::Sample sample = table.sample(view(theta_deg), random);
+        Rgb importance(random.uniform(), random.uniform(), random.uniform());
+        if (k % 4 == 0) importance[k % 3] = 0.0F;
+        const BcsdfTable::Sample sample = table.sample(view(theta_deg), random, importance);
         ASSERT_TRUE(sample.weight.allFinite() && sample.weight.minCoeff() >= 0.0F && sample.pdf > 0.0F)
             << named.name;
         mean.add(static_cast<double>(sample.weight[1]));
-        worst_here = std::max(worst_here, sample.weight.maxCoeff());
+        worst_here = std::max(worst_here, (importance * sample.weight).sum() / importance.sum());
       }
       const double albedo = bcsdf_sh(named.scattering, radians(theta_deg), 0)[0][1] * std::sqrt(4.0 * kPi);
       char name[64];
