@@ -19,9 +19,9 @@ Image read_comparable(const std::filesystem::path& path) {
 }  // namespace
 
 int compare_command(const CompareOptions& options, const CommonOptions& common) {
-  const PictureComparison comparison =
-      compare_images(read_comparable(options.a), options.a.string(), read_comparable(options.b), options.b.string(),
-                     options.layer);
+  const Image a = read_comparable(options.a);
+  const Image b = read_comparable(options.b);
+  const PictureComparison comparison = compare_images(a, options.a.string(), b, options.b.string(), options.layer);
   if (options.output) write_difference(*options.output, comparison);
   if (common.json) {
     std::cout << comparison_report(comparison).dump(2) << '\n';

@@ -163,6 +163,11 @@ int main_program(int argc, char** argv) {
   app.require_subcommand(1);
   Options options;
   const auto actions = add_commands(app, options);
+  if (argc > 1 && argv[1][0] != '-' && !actions.contains(argv[1])) {
+    std::string known;
+    for (const auto& [name, action] : actions) known += " " + name;
+    throw ConfigError(std::string("no subcommand ") + argv[1] + "; there are" + known);
+  }
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
