@@ -78,14 +78,30 @@ FabricDocument read_fabric_document(const fs::path& path, std::optional<std::uin
   fabric.volume = read_volume_settings(document.table("volume"));
   document.finish();
 
-  // canonical_text() is JSON. The cloth depends on everything but what is taken out here.
+  // canonical_text() is JSON. Defaults go in as well: an artifact made with another one is another artifact.
   auto cloth = nlohmann::json::parse(document.canonical_text());
-  auto transfer = cloth.at("transfer");
-  transfer.erase("order");
-  fabric.visibility_text = cloth.at("visibility").dump();
+  for (const AskedKey& asked : document.asked_keys()) {
+    const bool has_default = asked.default_value != "required" && asked.default_value != "optional";
+    if (has_default && asked.path != "light_from") cloth["defaults"][asked.path] = asked.default_value;
+  }
+  const auto take_section = [&cloth](const std::string& name) {
+    nlohmann::json section = {{"set", cloth.at(name)}};
+    cloth.erase(name);
+    auto& defaults = cloth["defaults"];
+    for (auto entry = defaults.begin(); entry != defaults.end();) {
+      const bool inside = entry.key().starts_with(name + ".");
+      if (inside) section["defaults"][entry.key()] = entry.value();
+      entry = inside ? defaults.erase(entry) : std::next(entry);
+    }
+    return section;
+  };
+  fabric.visibility_text = take_section("visibility").dump();
+  nlohmann::json transfer = take_section("transfer");
+  transfer["set"].erase("order");  // part of the key on its own
   fabric.transfer_text = transfer.dump();
-  fabric.volume_text = cloth.at("volume").dump();
-  for (const char* key : {"name", "light_from", "visibility", "transfer", "volume"}) cloth.erase(key);
+  fabric.volume_text = take_section("volume").dump();
+  cloth.erase("name");
+  cloth.erase("light_from");
   cloth["seed"] = fabric.config.seed;
   fabric.cloth_text = cloth.dump();
   return fabric;

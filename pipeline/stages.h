@@ -13,7 +13,8 @@
 //   pack        what the pack is to hold                    folder                   FabricPack
 //
 // "Geometry" is a hash of the fibers' shapes: a fabric that differs in its dyes only shares maps, ssdf, sg and volume.
-// A default value that changes, or an algorithm, needs a new version number of its stage (stages.cpp).
+// Keys hold the values of defaults too. An algorithm or a layout that changes needs a new version number of its stage
+// (stages.cpp).
 // Errors: ConfigError, FileError, Interrupted. Tested in tests/pipeline/end_to_end_test.cpp.
 
 #include <cstdint>
