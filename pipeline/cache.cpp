@@ -83,7 +83,9 @@ void Cache::publish_folder(std::string_view stage, const std::string& key,
 PartialChunks::PartialChunks(const Cache& cache, std::string_view stage, const std::string& key)
     : folder_(cache.artifact(stage, key, ".partial")) {}
 
-fs::path PartialChunks::file(std::uint64_t first) const { return folder_ / fmt::format("{:010}.safetensors", first); }
+fs::path PartialChunks::file(std::uint64_t first) const {
+  return folder_ / fmt::format("{:010}.safetensors", first);
+}
 
 fs::path PartialChunks::prepare(std::uint64_t first) const {
   make_folder(folder_);

@@ -26,7 +26,9 @@ namespace {
 namespace fs = std::filesystem;
 using Report = nlohmann::ordered_json;
 
-double rounded(double value) { return std::stod(fmt::format("{:.4g}", value)); }
+double rounded(double value) {
+  return std::stod(fmt::format("{:.4g}", value));
+}
 
 void describe_exemplar(const Exemplar& exemplar, std::uint64_t seed, Report& report) {
   const ExemplarSummary summary = summarize(exemplar);
@@ -34,9 +36,10 @@ void describe_exemplar(const Exemplar& exemplar, std::uint64_t seed, Report& rep
   report["fibers"] = summary.fibers;
   report["segments"] = summary.segments;
   report["tile_mm"] = {rounded(exemplar.width_mm), rounded(exemplar.height_mm)};
-  report["tile_repeats"] = fmt::format("endless: a ray marches from tile to tile until it hits, leaves the cloth or has "
-                                       "crossed {} tiles",
-                                       TileScene::kMaxTiles);
+  report["tile_repeats"] = fmt::format(
+      "endless: a ray marches from tile to tile until it hits, leaves the cloth or has "
+      "crossed {} tiles",
+      TileScene::kMaxTiles);
   report["thickness_mm"] = rounded(summary.thickness_mm);
   report["volume_fraction"] = rounded(summary.volume_fraction);
   report["mean_free_path_mm"] = rounded(scene.mean_free_path(seed, kMeanFreePathSamples));
@@ -73,14 +76,22 @@ Report describe_scene(const TomlTable& document) {
 
 const char* type_name(TensorType type) {
   switch (type) {
-    case TensorType::kU8: return "U8";
-    case TensorType::kU16: return "U16";
-    case TensorType::kU32: return "U32";
-    case TensorType::kU64: return "U64";
-    case TensorType::kI32: return "I32";
-    case TensorType::kF16: return "F16";
-    case TensorType::kF32: return "F32";
-    case TensorType::kF64: return "F64";
+    case TensorType::kU8:
+      return "U8";
+    case TensorType::kU16:
+      return "U16";
+    case TensorType::kU32:
+      return "U32";
+    case TensorType::kU64:
+      return "U64";
+    case TensorType::kI32:
+      return "I32";
+    case TensorType::kF16:
+      return "F16";
+    case TensorType::kF32:
+      return "F32";
+    case TensorType::kF64:
+      return "F64";
   }
   return "";
 }
@@ -114,7 +125,8 @@ Report describe_pack(const fs::path& folder) {
   Report report = {{"kind", "pack"}, {"name", manifest.name}, {"key", manifest.key}};
   report["program_version"] = manifest.program_version;
   report["light_from"] = manifest.light_from_both_sides ? "both" : "face";
-  for (const auto& [name, file] : manifest.files) report["file." + name] = fmt::format("{} bytes, checksum holds", file.bytes);
+  for (const auto& [name, file] : manifest.files)
+    report["file." + name] = fmt::format("{} bytes, checksum holds", file.bytes);
   const FabricPack pack = load_pack(folder);
   describe_exemplar(pack.exemplar, 1, report);
   std::uint64_t segment_bytes = 0;
@@ -137,7 +149,8 @@ void describe_volume(const IdVolume& volume, Report& report) {
   const auto filled = std::count_if(volume.ids.begin(), volume.ids.end(), [](std::int32_t id) { return id >= 0; });
   report["kind"] = "segment-id volume";
   report["voxels"] = fmt::format("{} x {} x {}", volume.size[0], volume.size[1], volume.size[2]);
-  report["voxel_um"] = {rounded(1e3 * volume.voxel_mm[0]), rounded(1e3 * volume.voxel_mm[1]), rounded(1e3 * volume.voxel_mm[2])};
+  report["voxel_um"] = {rounded(1e3 * volume.voxel_mm[0]), rounded(1e3 * volume.voxel_mm[1]),
+                        rounded(1e3 * volume.voxel_mm[2])};
   report["origin_mm"] = {rounded(volume.origin_mm[0]), rounded(volume.origin_mm[1]), rounded(volume.origin_mm[2])};
   report["filled_share"] =
       rounded(static_cast<double>(filled) / static_cast<double>(std::max<std::size_t>(volume.ids.size(), 1)));
@@ -176,10 +189,9 @@ Report describe_image(const fs::path& path) {
       high = std::max(high, value);
     }
     const double count = static_cast<double>(channel.values.size() - not_finite);
-    report["channel." + name] =
-        fmt::format("{}  mean {:.6g}  min {:.6g}  max {:.6g}{}", channel.type == ChannelType::kHalf ? "HALF" : "FLOAT",
-                    sum / std::max(count, 1.0), low, high,
-                    not_finite > 0 ? fmt::format("  {} values not finite", not_finite) : "");
+    report["channel." + name] = fmt::format(
+        "{}  mean {:.6g}  min {:.6g}  max {:.6g}{}", channel.type == ChannelType::kHalf ? "HALF" : "FLOAT",
+        sum / std::max(count, 1.0), low, high, not_finite > 0 ? fmt::format("  {} values not finite", not_finite) : "");
   }
   return report;
 }

@@ -15,16 +15,16 @@ PixelRect parse_crop(const std::vector<int>& corners, const CameraConfig& camera
   const bool inside = 0 <= corners[0] && corners[0] < corners[2] && corners[2] <= camera.width &&  //
                       0 <= corners[1] && corners[1] < corners[3] && corners[3] <= camera.height;
   if (!inside) {
-    throw ConfigError(fmt::format("--crop: expected x0,y0,x1,y1 with x0 < x1 <= {} and y0 < y1 <= {}; got {}", camera.width,
-                                  camera.height, fmt::join(corners, ",")));
+    throw ConfigError(fmt::format("--crop: expected x0,y0,x1,y1 with x0 < x1 <= {} and y0 < y1 <= {}; got {}",
+                                  camera.width, camera.height, fmt::join(corners, ",")));
   }
   return {corners[0], corners[1], corners[2] - corners[0], corners[3] - corners[1]};
 }
 
 const ViewConfig& find_view(const SceneConfig& scene, const std::string& name) {
   if (name.empty()) return scene.views.front();
-  const auto found = std::find_if(scene.views.begin(), scene.views.end(),
-                                  [&](const ViewConfig& view) { return view.name == name; });
+  const auto found =
+      std::find_if(scene.views.begin(), scene.views.end(), [&](const ViewConfig& view) { return view.name == name; });
   if (found != scene.views.end()) return *found;
   std::string known;
   for (const ViewConfig& view : scene.views) known += (known.empty() ? "" : ", ") + view.name;
@@ -39,7 +39,8 @@ void apply_overrides(const RenderOptions& options, PictureRequest& request) {
   if (!path && (options.seconds || options.local || options.bounces || !options.estimator.empty())) {
     throw ConfigError("--seconds, --local, --bounces and --estimator belong to --method path");
   }
-  if (path && request.spp % 2 != 0) throw ConfigError("--spp: expected an even number for --method path: it keeps two halves");
+  if (path && request.spp % 2 != 0)
+    throw ConfigError("--spp: expected an even number for --method path: it keeps two halves");
   static const std::map<std::string, LightEstimator> estimators = {{"", LightEstimator::kCombined},
                                                                    {"mis", LightEstimator::kCombined},
                                                                    {"light", LightEstimator::kShadowRays},

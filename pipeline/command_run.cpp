@@ -76,10 +76,11 @@ int run_command(const RunOptions& options, const CommonOptions& common) {
 
     const fs::path difference = folder / (name + "-difference.exr");
     const PictureComparison comparison =
-        compare_images(cropped(read_exr(picture), view.reference->crop), picture.filename().string(), read_exr(reference),
-                       reference.filename().string(), "");
+        compare_images(cropped(read_exr(picture), view.reference->crop), picture.filename().string(),
+                       read_exr(reference), reference.filename().string(), "");
     write_difference(difference, comparison);
-    write_file_atomically(fs::path(difference).replace_extension(".json"), comparison_report(comparison).dump(2) + "\n");
+    write_file_atomically(fs::path(difference).replace_extension(".json"),
+                          comparison_report(comparison).dump(2) + "\n");
     job.console().say(fmt::format("{}: {}", name, comparison_text(comparison)));
     job.add_artifact(difference);
   }

@@ -27,8 +27,8 @@ struct StageOptions {
   std::filesystem::path fabric;
   StageTarget target = StageTarget::kPack;
   std::optional<int> order;
-  std::optional<Shard> shard;                      // visibility and transfer
-  std::optional<std::filesystem::path> output;     // pack: a copy outside the cache
+  std::optional<Shard> shard;                   // visibility and transfer
+  std::optional<std::filesystem::path> output;  // pack: a copy outside the cache
 };
 /// Prints the path of the artifact.
 int stage_command(const StageOptions& options, const CommonOptions& common);
@@ -46,13 +46,13 @@ struct RenderOptions {
   std::filesystem::path scene;
   std::filesystem::path output;
   std::string view;
-  std::string method;              // the scene's where empty
+  std::string method;  // the scene's where empty
   std::optional<int> spp;
-  std::optional<double> seconds;   // the path tracer's time
-  std::vector<int> crop;           // x0, y0, x1, y1, or empty
+  std::optional<double> seconds;  // the path tracer's time
+  std::vector<int> crop;          // x0, y0, x1, y1, or empty
   bool local = false;
   std::optional<int> bounces;
-  std::string estimator;           // "mis" where empty
+  std::string estimator;  // "mis" where empty
   std::optional<int> order;
 };
 int render_command(const RenderOptions& options, const CommonOptions& common);
@@ -61,7 +61,7 @@ struct CompareOptions {
   std::filesystem::path a;
   std::filesystem::path b;
   std::optional<std::filesystem::path> output;
-  std::string layer;               // the beauty where empty
+  std::string layer;  // the beauty where empty
   std::optional<double> max_rmse;
   std::optional<double> max_mean;
 };

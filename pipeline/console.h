@@ -61,8 +61,8 @@ class Progress {
   std::uint64_t first_;  // done before this run
   std::uint64_t done_;
   Clock::time_point start_;
-  Clock::time_point shown_;       // when the last line was written
-  std::uint64_t shown_tenths_;    // tenths of the work when the last plain line was written
+  Clock::time_point shown_;     // when the last line was written
+  std::uint64_t shown_tenths_;  // tenths of the work when the last plain line was written
   std::mutex mutex_;
 };
 

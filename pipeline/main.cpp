@@ -61,25 +61,29 @@ void add_common(CLI::App& command, Options& options) {
 
 void add_building(CLI::App& command, Options& options) {
   add_common(command, options);
-  command.add_option("--cache", options.common.cache, "Folder of the artifacts; $HEDDLE_CACHE or out/cache where absent");
+  command.add_option("--cache", options.common.cache,
+                     "Folder of the artifacts; $HEDDLE_CACHE or out/cache where absent");
   command.add_option("--seed", options.common.seed, "In place of the seed that the config states");
 }
 
 void add_order(CLI::App& command, std::optional<int>& order) {
-  command.add_option("--order", order, "Highest SH band of the transfer, in place of the fabric's")->check(CLI::Range(0, 5));
+  command.add_option("--order", order, "Highest SH band of the transfer, in place of the fabric's")
+      ->check(CLI::Range(0, 5));
 }
 
-void add_stage_command(CLI::App& app, Options& options, const std::string& name, const std::string& help, StageTarget target,
-                       bool with_shard) {
+void add_stage_command(CLI::App& app, Options& options, const std::string& name, const std::string& help,
+                       StageTarget target, bool with_shard) {
   CLI::App* command = app.add_subcommand(name, help);
   add_building(*command, options);
   command->add_option("FABRIC.toml", options.stage.fabric, "Fabric config")->required();
   if (target == StageTarget::kTransfer || target == StageTarget::kPack) add_order(*command, options.stage.order);
   if (target == StageTarget::kPack) {
-    command->add_option("-o,--output,--outfile", options.stage.output, "Folder for a copy of the pack outside the cache");
+    command->add_option("-o,--output,--outfile", options.stage.output,
+                        "Folder for a copy of the pack outside the cache");
   }
   if (with_shard) {
-    command->add_option("--shard", options.shard, "i/n: compute only every n-th chunk, leave it in the cache, publish nothing");
+    command->add_option("--shard", options.shard,
+                        "i/n: compute only every n-th chunk, leave it in the cache, publish nothing");
   }
   command->callback([&options, target] { options.stage.target = target; });
 }
@@ -111,9 +115,11 @@ std::map<std::string, std::function<int()>> add_commands(CLI::App& app, Options&
   RenderOptions& picture = options.render;
   add_building(*render, options);
   render->add_option("SCENE.toml", picture.scene, "Scene config")->required();
-  render->add_option("-o,--output,--outfile", picture.output, "The .exr file; a .png and a .json go beside it")->required();
+  render->add_option("-o,--output,--outfile", picture.output, "The .exr file; a .png and a .json go beside it")
+      ->required();
   render->add_option("--view", picture.view, "Name of one of the scene's [[view]] tables; its [camera] where absent");
-  render->add_option("--method", picture.method, "In place of the scene's")->check(CLI::IsMember({"exact", "volume", "path"}));
+  render->add_option("--method", picture.method, "In place of the scene's")
+      ->check(CLI::IsMember({"exact", "volume", "path"}));
   render->add_option("--spp", picture.spp, "Samples per pixel, in place of the scene's")->check(CLI::Range(1, 1 << 24));
   render->add_option("--seconds", picture.seconds, "Path tracer: go on until this much time is spent")
       ->check(CLI::PositiveNumber);
@@ -128,7 +134,8 @@ std::map<std::string, std::function<int()>> add_commands(CLI::App& app, Options&
   add_order(*render, picture.order);
   actions["render"] = [&options] { return render_command(options.render, options.common); };
 
-  CLI::App* evaluate = app.add_subcommand("eval", "JSON lines in, JSON lines out: any scattering model or basis function");
+  CLI::App* evaluate =
+      app.add_subcommand("eval", "JSON lines in, JSON lines out: any scattering model or basis function");
   evaluate->footer("Quantities and their fields: docs/eval.md");
   actions["eval"] = [] { return run_eval(std::cin, std::cout); };
 
@@ -139,7 +146,8 @@ std::map<std::string, std::function<int()>> add_commands(CLI::App& app, Options&
   compare->add_option("B.exr", pair.b, "Reference")->required();
   compare->add_option("-o,--output,--outfile", pair.output, "Difference picture: an .exr, and a .png beside it");
   compare->add_option("--layer", pair.layer, "Layer to compare, such as single; the beauty where absent");
-  compare->add_option("--max-rmse", pair.max_rmse, "Status 1 where the relative RMSE is larger")->check(CLI::NonNegativeNumber);
+  compare->add_option("--max-rmse", pair.max_rmse, "Status 1 where the relative RMSE is larger")
+      ->check(CLI::NonNegativeNumber);
   compare->add_option("--max-mean", pair.max_mean, "Status 1 where the mean colour is off by a larger share")
       ->check(CLI::NonNegativeNumber);
   actions["compare"] = [&options] { return compare_command(options.compare, options.common); };

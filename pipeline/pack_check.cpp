@@ -20,7 +20,9 @@ constexpr double kHalfRounding = 1e-3;
 }
 
 /// Lengths that were computed in float from the same numbers.
-bool nearly_equal(double a, double b) { return std::abs(a - b) <= 1e-5 * (std::abs(a) + std::abs(b)); }
+bool nearly_equal(double a, double b) {
+  return std::abs(a - b) <= 1e-5 * (std::abs(a) + std::abs(b));
+}
 
 void check_origin(const fs::path& path) {
   const TensorFile file = TensorFile::read(path);
@@ -79,7 +81,8 @@ void check_transfer(const FabricPack& pack) {
   for (std::uint32_t cell = 0; cell < transfer.grid.count(); ++cell) {
     if (has_segments[cell] != (transfer.paths[cell] > 0)) {
       fail(pack, kFile, 10,
-           fmt::format("cell {} {} segments and {} paths", cell, has_segments[cell] ? "has" : "has no", transfer.paths[cell]));
+           fmt::format("cell {} {} segments and {} paths", cell, has_segments[cell] ? "has" : "has no",
+                       transfer.paths[cell]));
     }
   }
 }

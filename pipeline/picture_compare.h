@@ -15,8 +15,8 @@ namespace heddle {
 
 struct PictureComparison {
   PictureError error;
-  bool halves = false;      // the reference came in two halves
-  Image difference;         // R, G, B: picture - reference
+  bool halves = false;                // the reference came in two halves
+  Image difference;                   // R, G, B: picture - reference
   std::vector<std::uint8_t> preview;  // [height][width][3]: white = equal, red = too bright, blue = too dark
 };
 

@@ -38,9 +38,12 @@ std::string crop_text(const PixelRect& crop) {
 
 const char* estimator_name(LightEstimator estimator) {
   switch (estimator) {
-    case LightEstimator::kCombined: return "mis";
-    case LightEstimator::kShadowRays: return "light";
-    case LightEstimator::kEscapes: return "bcsdf";
+    case LightEstimator::kCombined:
+      return "mis";
+    case LightEstimator::kShadowRays:
+      return "light";
+    case LightEstimator::kEscapes:
+      return "bcsdf";
   }
   return "";
 }
@@ -111,8 +114,8 @@ std::string SceneJob::picture_key(const PictureRequest& request) {
   values.emplace_back("method", render_method_name(request.method));
   values.emplace_back("crop", crop_text(request.crop));
   values.emplace_back("sampling", fmt::format("spp {} seed {}", request.spp, request.seed));
-  values.emplace_back("paths", fmt::format("local {} bounces {} estimator {}", request.local, request.bounces.value_or(0),
-                                           estimator_name(request.estimator)));
+  values.emplace_back("paths", fmt::format("local {} bounces {} estimator {}", request.local,
+                                           request.bounces.value_or(0), estimator_name(request.estimator)));
   values.emplace_back("shadow_sigma_mm", config_.shadow_sigma_mm ? fmt::format("{}", *config_.shadow_sigma_mm) : "");
   for (const Artifact& pack : packs_for(request.method)) values.emplace_back("pack", pack.key);
   for (const ClothConfig& cloth : config_.cloths) {
@@ -160,7 +163,8 @@ PictureResult SceneJob::render(const PictureRequest& request, const std::string&
   FrameBuffers frame;
   if (request.method == RenderMethod::kPath) {
     const std::vector<BcsdfTable> materials = scene_materials(*loaded.scene);
-    const PathTracer tracer(*loaded.scene, materials, config_.lights, config_.background, path_tracer_settings(request));
+    const PathTracer tracer(*loaded.scene, materials, config_.lights, config_.background,
+                            path_tracer_settings(request));
     frame = trace_picture(tracer, camera, request.crop, request.seed, {request.spp, request.seconds}, report_progress);
   } else {
     std::vector<const FabricPack*> packs;

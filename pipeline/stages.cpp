@@ -178,8 +178,8 @@ Artifact FabricStages::synth() {
 }
 
 template <class Compute>
-void FabricStages::finish_chunks(const Stage& stage, std::uint32_t items, std::uint32_t per_chunk, const std::string& unit,
-                                 Shard shard, StageResult& result, Compute&& compute) {
+void FabricStages::finish_chunks(const Stage& stage, std::uint32_t items, std::uint32_t per_chunk,
+                                 const std::string& unit, Shard shard, StageResult& result, Compute&& compute) {
   const PartialChunks chunks(context_->cache, stage.name, stage.key);
   std::vector<std::uint32_t> missing;
   std::uint64_t items_of_shard = 0;
@@ -226,7 +226,9 @@ void FabricStages::read_chunks(const Stage& stage, std::uint32_t items, std::uin
 /// A shard's own line in the report; nothing is published.
 template <class Work>
 void FabricStages::run_shard(const Stage& stage, Work&& work) {
-  StageResult result{.fabric = document_.config.name, .stage = stage.name, .key = stage.key,
+  StageResult result{.fabric = document_.config.name,
+                     .stage = stage.name,
+                     .key = stage.key,
                      .artifact = context_->cache.artifact(stage.name, stage.key, stage.extension)};
   if (!fs::exists(result.artifact)) {
     const Clock::time_point start = Clock::now();
@@ -239,15 +241,15 @@ void FabricStages::run_shard(const Stage& stage, Work&& work) {
 
 // Maps do not depend on [visibility], which says how they are compressed.
 FabricStages::Stage FabricStages::maps_stage() {
-  return make_stage("maps", 1, ".safetensors", "",
-                    {{"geometry", geometry_key()},
-                     {"light_from", light_from()},
-                     {"seed", fmt::format("{}", document_.config.seed)}});
+  return make_stage(
+      "maps", 1, ".safetensors", "",
+      {{"geometry", geometry_key()}, {"light_from", light_from()}, {"seed", fmt::format("{}", document_.config.seed)}});
 }
 
 /// Computes one chunk of maps.
 void FabricStages::compute_maps(const Stage& stage, const fs::path& file, std::uint32_t first, std::uint32_t end) {
-  write_visibility_maps(file, bake_visibility_maps(scene(), origins(), document_.config.light_from_both_sides, first, end),
+  write_visibility_maps(file,
+                        bake_visibility_maps(scene(), origins(), document_.config.light_from_both_sides, first, end),
                         stage.metadata);
 }
 
@@ -261,13 +263,14 @@ Artifact FabricStages::maps() {
     finish_chunks(stage, segments, kSegmentsPerChunk, "segments", Shard{}, result, compute);
     VisibilityMaps all;
     all.both_sides = document_.config.light_from_both_sides;
-    read_chunks(stage, segments, kSegmentsPerChunk, compute, [&](const fs::path& file, std::uint32_t first, std::uint32_t end) {
-      const VisibilityMaps chunk = read_visibility_maps(file);
-      if (chunk.first_segment != first || chunk.count() != end - first || chunk.both_sides != all.both_sides) {
-        throw FileError(file.string() + ": not the chunk that its name says");
-      }
-      all.append(chunk);
-    });
+    read_chunks(
+        stage, segments, kSegmentsPerChunk, compute, [&](const fs::path& file, std::uint32_t first, std::uint32_t end) {
+          const VisibilityMaps chunk = read_visibility_maps(file);
+          if (chunk.first_segment != first || chunk.count() != end - first || chunk.both_sides != all.both_sides) {
+            throw FileError(file.string() + ": not the chunk that its name says");
+          }
+          all.append(chunk);
+        });
     write_visibility_maps(path, all, stage.metadata);
     PartialChunks(context_->cache, stage.name, stage.key).remove();
   });
@@ -276,8 +279,9 @@ Artifact FabricStages::maps() {
 void FabricStages::visibility_shard(Shard shard) {
   const Stage stage = maps_stage();
   run_shard(stage, [&](StageResult& result) {
-    finish_chunks(stage, static_cast<std::uint32_t>(exemplar().segment_count()), kSegmentsPerChunk, "segments", shard, result,
-                  [&](const fs::path& file, std::uint32_t first, std::uint32_t end) { compute_maps(stage, file, first, end); });
+    finish_chunks(
+        stage, static_cast<std::uint32_t>(exemplar().segment_count()), kSegmentsPerChunk, "segments", shard, result,
+        [&](const fs::path& file, std::uint32_t first, std::uint32_t end) { compute_maps(stage, file, first, end); });
   });
 }
 
@@ -300,7 +304,9 @@ Artifact FabricStages::sgs() {
   });
 }
 
-const char* FabricStages::light_from() const { return document_.config.light_from_both_sides ? "both" : "face"; }
+const char* FabricStages::light_from() const {
+  return document_.config.light_from_both_sides ? "both" : "face";
+}
 
 TransferSettings FabricStages::transfer_settings(std::optional<int> order) const {
   TransferSettings settings = document_.transfer;
@@ -350,17 +356,17 @@ Artifact FabricStages::transfer(std::optional<int> order) {
     };
     finish_chunks(stage, cells, kCellsPerChunk, "cells", Shard{}, result, compute);
     std::vector<TransferChunk> chunks;
-    read_chunks(stage, cells, kCellsPerChunk, compute, [&](const fs::path& file, std::uint32_t first, std::uint32_t end) {
-      chunks.push_back(read_transfer_chunk(file, first, end - first, settings.order));
-    });
+    read_chunks(stage, cells, kCellsPerChunk, compute,
+                [&](const fs::path& file, std::uint32_t first, std::uint32_t end) {
+                  chunks.push_back(read_transfer_chunk(file, first, end - first, settings.order));
+                });
     write_transfer(path, work->baker->assemble(chunks), stage.metadata);
     PartialChunks(context_->cache, stage.name, stage.key).remove();
   });
 }
 
 Artifact FabricStages::volume() {
-  const Stage stage =
-      make_stage("voxelize", 1, ".vdb", document_.volume_text, {{"geometry", geometry_key()}});
+  const Stage stage = make_stage("voxelize", 1, ".vdb", document_.volume_text, {{"geometry", geometry_key()}});
   return artifact_of(stage, [&](const fs::path& path, StageResult&) {
     write_id_volume(path, voxelize(exemplar(), document_.volume), stage.metadata);
   });
@@ -400,8 +406,9 @@ void FabricStages::transfer_shard(std::optional<int> order, Shard shard) {
   const Stage stage = transfer_stage(settings);
   run_shard(stage, [&](StageResult& result) {
     const auto work = transfer_work(settings);
-    finish_chunks(stage, work->baker->cell_count(), kCellsPerChunk, "cells", shard, result,
-                  [&](const fs::path& file, std::uint32_t first, std::uint32_t end) { work->compute(file, first, end); });
+    finish_chunks(
+        stage, work->baker->cell_count(), kCellsPerChunk, "cells", shard, result,
+        [&](const fs::path& file, std::uint32_t first, std::uint32_t end) { work->compute(file, first, end); });
   });
 }
 

@@ -14,7 +14,7 @@
 //
 // "Geometry" is a hash of the fibers' shapes: a fabric that differs in its dyes only shares maps, ssdf, sg and volume.
 // A default value that changes, or an algorithm, needs a new version number of its stage (stages.cpp).
-// Errors: ConfigError, FileError, Interrupted. Tested in tests/pipeline/stages_test.cpp and end_to_end_test.cpp.
+// Errors: ConfigError, FileError, Interrupted. Tested in tests/pipeline/end_to_end_test.cpp.
 
 #include <cstdint>
 #include <filesystem>
@@ -59,9 +59,9 @@ struct StageResult {
   std::string stage;
   std::string key;
   std::filesystem::path artifact;
-  bool built = false;          // false: found in the cache
-  std::uint64_t chunks = 0;    // finished by this process
-  std::uint64_t resumed = 0;   // chunks found finished
+  bool built = false;         // false: found in the cache
+  std::uint64_t chunks = 0;   // finished by this process
+  std::uint64_t resumed = 0;  // chunks found finished
   double seconds = 0;
 };
 
@@ -130,8 +130,8 @@ class FabricStages {
   void run_shard(const Stage& stage, Work&& work);
   /// compute(file, first, end) for those of the shard's chunks that are not on disk.
   template <class Compute>
-  void finish_chunks(const Stage& stage, std::uint32_t items, std::uint32_t per_chunk, const std::string& unit, Shard shard,
-                     StageResult& result, Compute&& compute);
+  void finish_chunks(const Stage& stage, std::uint32_t items, std::uint32_t per_chunk, const std::string& unit,
+                     Shard shard, StageResult& result, Compute&& compute);
   template <class Compute, class Read>
   void read_chunks(const Stage& stage, std::uint32_t items, std::uint32_t per_chunk, Compute&& compute, Read&& read);
 

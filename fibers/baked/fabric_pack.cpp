@@ -50,8 +50,9 @@ Json to_json(const PackManifest& manifest) {
 PackManifest from_json(const Json& document, const std::string& path) {
   if (document.at("format") != kFormatName) throw FileError(path + ": not a pack manifest");
   if (document.at("version") != kFormatVersion) {
-    throw FileError(fmt::format("{}: written in pack layout {}, this program reads layout {}; run `heddle precompute` again",
-                                path, document.at("version").dump(), kFormatVersion));
+    throw FileError(
+        fmt::format("{}: written in pack layout {}, this program reads layout {}; run `heddle precompute` again", path,
+                    document.at("version").dump(), kFormatVersion));
   }
   if (document.at(kChecksumKey) != manifest_checksum(document)) {
     throw FileError(path + ": the manifest was changed after it was written (its own checksum differs)");
@@ -93,8 +94,8 @@ void verify_file(const std::filesystem::path& path, const PackFile& expected) {
   }
   const std::string found = content_hash_of_file(path);
   if (found != expected.xxh3_128) {
-    throw FileError(fmt::format("{}: checksum {}, {} says {}: corrupt", path.string(), found, kManifestName,
-                                expected.xxh3_128));
+    throw FileError(
+        fmt::format("{}: checksum {}, {} says {}: corrupt", path.string(), found, kManifestName, expected.xxh3_128));
   }
 }
 
@@ -137,7 +138,8 @@ FabricPack load_pack(const std::filesystem::path& folder) {
   const std::size_t segments = pack.exemplar.segment_count();
   const auto require_rows = [&](std::size_t rows, const std::string& name) {
     if (rows != segments) {
-      throw FileError(fmt::format("{}: holds {} segments, the fibers have {}", (folder / name).string(), rows, segments));
+      throw FileError(
+          fmt::format("{}: holds {} segments, the fibers have {}", (folder / name).string(), rows, segments));
     }
   };
   if (manifest.files.contains("ssdf.safetensors")) {
@@ -159,7 +161,8 @@ FabricPack load_pack(const std::filesystem::path& folder) {
     pack.volume = read_id_volume(folder / "volume.vdb");
     for (const std::int32_t id : pack.volume->ids) {
       if (id < -1 || (id >= 0 && static_cast<std::size_t>(id) >= segments)) {
-        throw FileError(fmt::format("{}: segment id {} of {} segments", (folder / "volume.vdb").string(), id, segments));
+        throw FileError(
+            fmt::format("{}: segment id {} of {} segments", (folder / "volume.vdb").string(), id, segments));
       }
     }
   }

@@ -44,7 +44,8 @@ Keys documented(const std::string& section) {
 }
 
 void add(const TomlTable& document, Keys& keys) {
-  for (const AskedKey& key : document.asked_keys()) keys[key.path] = key.type + " | " + key.range + " | " + key.default_value;
+  for (const AskedKey& key : document.asked_keys())
+    keys[key.path] = key.type + " | " + key.range + " | " + key.default_value;
 }
 
 std::vector<fs::path> files_in(const char* folder) {
@@ -64,7 +65,8 @@ void expect_equal(const Keys& asked, const Keys& documented) {
       EXPECT_EQ(found->second, properties) << key;
     }
   }
-  for (const auto& [key, properties] : documented) EXPECT_TRUE(asked.contains(key)) << key << " is documented, and nobody asks for it";
+  for (const auto& [key, properties] : documented)
+    EXPECT_TRUE(asked.contains(key)) << key << " is documented, and nobody asks for it";
 }
 
 TEST(ConfigDocumentation, NamesEveryKeyOfAFabric) {

@@ -43,7 +43,8 @@ std::vector<std::string> differences(const fs::path& a, const fs::path& b) {
 
 bool any_chunk_in(const fs::path& stage_folder) {
   std::error_code error;
-  for (fs::recursive_directory_iterator entry(stage_folder, error), end; !error && entry != end; entry.increment(error)) {
+  for (fs::recursive_directory_iterator entry(stage_folder, error), end; !error && entry != end;
+       entry.increment(error)) {
     if (entry->path().extension() == ".safetensors" && entry->path().parent_path().extension() == ".partial" &&
         entry->path().filename().string().find("tmp") == std::string::npos) {
       return true;
@@ -205,9 +206,9 @@ TEST(PackEndToEnd, NumpyAloneOpensAPack) {
   for (const auto& [name, bytes] : files_of(shop / "cache" / "synth")) {
     std::ofstream(shop / "cotton.pack" / "fibers.safetensors", std::ios::binary) << bytes;
   }
-  std::ofstream(shop / "snippet.py") << snippet << "print(tensors['points_mm'].shape[1], round(1000 * float(tensors['radius_mm'].min()), 3))\n";
-  const std::string command =
-      "cd '" + (shop / "").string() + "' && /usr/bin/python3 snippet.py > printed.txt 2>&1";
+  std::ofstream(shop / "snippet.py")
+      << snippet << "print(tensors['points_mm'].shape[1], round(1000 * float(tensors['radius_mm'].min()), 3))\n";
+  const std::string command = "cd '" + (shop / "").string() + "' && /usr/bin/python3 snippet.py > printed.txt 2>&1";
   EXPECT_EQ(std::system(command.c_str()), 0) << text_of(shop / "printed.txt");
   EXPECT_EQ(text_of(shop / "printed.txt").substr(0, 5), "3 10.") << text_of(shop / "printed.txt");
 }
@@ -233,7 +234,9 @@ TEST(PicturesEndToEnd, SameBytesForOneAndTwoThreadsAndNothingTwice) {
   ASSERT_EQ(shop.run({"render", "scene.toml", "-o", "volume.exr", "--method", "volume"}).status, 0);
   ASSERT_EQ(shop.run({"render", "scene.toml", "-o", "exact.exr"}).status, 0);
   EXPECT_EQ(text_of(shop / "exact.exr"), text_of(shop / "pictures.2" / "scene.exr"));
-  ASSERT_EQ(shop.run({"render", "scene.toml", "-o", "crop.exr", "--crop", "4,4,12,10", "--method", "path", "--local"}).status, 0);
+  ASSERT_EQ(
+      shop.run({"render", "scene.toml", "-o", "crop.exr", "--crop", "4,4,12,10", "--method", "path", "--local"}).status,
+      0);
   EXPECT_EQ(shop.run({"compare", "volume.exr", "exact.exr", "-o", "difference.exr"}).status, 0);
   EXPECT_EQ(shop.run({"compare", "volume.exr", "exact.exr", "--max-rmse", "0"}).status, 1);
   EXPECT_EQ(shop.run({"compare", "volume.exr", "crop.exr"}).status, 2);
@@ -244,7 +247,7 @@ TEST(PicturesEndToEnd, SameBytesForOneAndTwoThreadsAndNothingTwice) {
 struct BadInput {
   std::string name;
   Arguments arguments;
-  std::string file;     // content of bad.toml
+  std::string file;  // content of bad.toml
   int status;
   std::string message;  // part of what must be said
 };

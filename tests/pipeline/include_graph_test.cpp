@@ -84,7 +84,8 @@ std::vector<Include> includes_of(const std::string& file, const std::string& tex
 
 std::string broken_arrow(const Include& include) {
   if (!include.quoted) return "";
-  if (!fs::exists(kRoot / include.target)) return include.file + " includes " + include.target + ", not a path from the root";
+  if (!fs::exists(kRoot / include.target))
+    return include.file + " includes " + include.target + ", not a path from the root";
   const std::string from = module_of(include.file);
   const std::string to = module_of(include.target);
   if (from == to || kArrows.at(from).contains(to)) return "";
@@ -102,7 +103,8 @@ std::string broken_confinement(const Include& include) {
 
 std::string expected_guard(const std::string& file) {
   std::string guard = "HEDDLE_";
-  for (const char c : file) guard += std::isalnum(static_cast<unsigned char>(c)) ? static_cast<char>(std::toupper(c)) : '_';
+  for (const char c : file)
+    guard += std::isalnum(static_cast<unsigned char>(c)) ? static_cast<char>(std::toupper(c)) : '_';
   return guard + "_";
 }
 
@@ -124,7 +126,8 @@ TEST(IncludeGraph, GuardsMatchPaths) {
   for (const std::string& file : source_files()) {
     if (!file.ends_with(".h")) continue;
     const std::string guard = expected_guard(file);
-    EXPECT_EQ(text_of(file).rfind("#ifndef " + guard + "\n#define " + guard + "\n", 0), 0U) << file << " wants " << guard;
+    EXPECT_EQ(text_of(file).rfind("#ifndef " + guard + "\n#define " + guard + "\n", 0), 0U)
+        << file << " wants " << guard;
   }
 }
 

@@ -16,14 +16,21 @@ FabricPack sound_pack() {
   pack.folder = "x.pack";
   pack.exemplar = crossed_layers(test_cotton());
   const std::size_t segments = pack.exemplar.segment_count();
-  pack.ssdf = SsdfVisibility{.resolution = 2, .components = 1, .mean = {1, 0, 0, -1}, .basis = {1, 1, 1, 1},
-                             .coefficients = std::vector<Half>(segments), .sees_nothing = std::vector<std::uint8_t>(segments)};
-  pack.sgs = SgVisibility{.sharpness = 48, .axes = {Vec3(0, 0, 1)},
+  pack.ssdf = SsdfVisibility{.resolution = 2,
+                             .components = 1,
+                             .mean = {1, 0, 0, -1},
+                             .basis = {1, 1, 1, 1},
+                             .coefficients = std::vector<Half>(segments),
+                             .sees_nothing = std::vector<std::uint8_t>(segments)};
+  pack.sgs = SgVisibility{.sharpness = 48,
+                          .axes = {Vec3(0, 0, 1)},
                           .weights = std::vector<Half>(segments, half_from_float(2)),
-                          .rotation = std::vector<Half>(segments), .sees_nothing = std::vector<std::uint8_t>(segments)};
+                          .rotation = std::vector<Half>(segments),
+                          .sees_nothing = std::vector<std::uint8_t>(segments)};
   Transfer transfer;
   transfer.order = 0;
-  transfer.grid = make_cell_grid(pack.exemplar.width_mm, pack.exemplar.height_mm, pack.exemplar.z_min, pack.exemplar.z_max, 10);
+  transfer.grid =
+      make_cell_grid(pack.exemplar.width_mm, pack.exemplar.height_mm, pack.exemplar.z_min, pack.exemplar.z_max, 10);
   transfer.matrices = {0.1F, 0.1F, 0.1F};
   transfer.standard_error = {0, 0, 0};
   transfer.paths = {1024};

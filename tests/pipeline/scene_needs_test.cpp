@@ -23,7 +23,7 @@ TEST(SceneNeeds, FollowTheLights) {
   EXPECT_FALSE(needs({gaussian(100)}).ssdf);  // the blend starts above 100 ...
   EXPECT_TRUE(needs({gaussian(101)}).ssdf);
   EXPECT_TRUE(needs({gaussian(199)}).sgs);
-  EXPECT_FALSE(needs({gaussian(200)}).sgs);   // ... and is over at 200
+  EXPECT_FALSE(needs({gaussian(200)}).sgs);  // ... and is over at 200
   EXPECT_TRUE(needs({gaussian(300), gaussian(10)}).sgs);
   EXPECT_TRUE(needs({gaussian(300), gaussian(10)}).ssdf);
 }
