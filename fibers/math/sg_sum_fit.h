@@ -24,7 +24,7 @@ enum class SgWeights { kVoronoi, kNnls };
 
 /// The sharpness that suits 48 axes: they lie farther apart on the whole sphere.
 constexpr double default_sg_sharpness(FibonacciSet axes) {
-  return axes == FibonacciSet::kSphere ? 28 : 40;
+  return axes == FibonacciSet::kSphere ? 32 : 48;
 }
 
 struct SgSumShape {

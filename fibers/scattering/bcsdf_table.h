@@ -11,7 +11,7 @@
 // mixture. Albedos are weighed by `importance`, the throughput of the path so far: then the sum of the throughput's colours
 // stays almost what it was. With colours weighed alike whatever the path carries, weights of a white fiber's 30 bounces
 // vary as the product of 30 factors (throughputs in the hundreds, most of the light in few paths).
-// Worst change of that sum over the fibers and angles tested: a factor of 1.7 (hundreds when Schlick's F at theta_o chooses
+// Worst change of that sum over the fibers and angles tested: a factor of 2.6 (hundreds when Schlick's F at theta_o chooses
 // the lobe). Building one takes about 0.1 s. Tested, with the errors and the worst weights, in
 // tests/fibers/scattering/bcsdf_table_test.cpp.
 

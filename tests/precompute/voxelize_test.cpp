@@ -5,8 +5,11 @@
 #include <cmath>
 #include <limits>
 
+#include "fibers/baked/id_bricks.h"
 #include "fibers/math/random.h"
+#include "fibers/math/sampling.h"
 #include "formats/input_error.h"
+#include "tests/support/small_exemplars.h"
 
 namespace heddle {
 namespace {
@@ -50,16 +53,14 @@ TEST(VoxelizeAgreement, EveryVoxelHoldsTheNearestAxisThatReachesItsCentre) {
                           static_cast<float>(volume.origin_mm[2] + (z + 0.5) * volume.voxel_mm[2]));
         double nearest = std::numeric_limits<double>::infinity();
         double nearest_of_id = std::numeric_limits<double>::infinity();
-        double margin =
-            std::numeric_limits<double>::infinity();  // to a surface: a rounding there decides either way
-        const std::int32_t id =
-            volume.ids[(static_cast<std::size_t>(z) * volume.size[1] + y) * volume.size[0] + x];
+        double margin = std::numeric_limits<double>::infinity();  // to a surface: a rounding there decides either way
+        const std::int32_t id = volume.ids[(static_cast<std::size_t>(z) * volume.size[1] + y) * volume.size[0] + x];
         for (std::uint32_t s = 0; s < exemplar.segment_count(); ++s) {
           const float radius = exemplar.radius_mm[exemplar.segment_fiber[s]];
           for (int j = -3; j <= 3; ++j) {
             for (int i = -3; i <= 3; ++i) {
-              const Vec3 shift(static_cast<float>(i) * exemplar.width_mm,
-                               static_cast<float>(j) * exemplar.height_mm, 0);
+              const Vec3 shift(static_cast<float>(i) * exemplar.width_mm, static_cast<float>(j) * exemplar.height_mm,
+                               0);
               const double d = distance_to_segment(centre, exemplar.points[exemplar.segment_point[s]] + shift,
                                                    exemplar.points[exemplar.segment_point[s] + 1] + shift);
               margin = std::min(margin, std::abs(d - radius));
@@ -116,9 +117,51 @@ TEST(VoxelizeLaw, FilledShareIsTheVolumeOfTheFiber) {
   EXPECT_NEAR(filled / static_cast<double>(volume.ids.size()) / expected, 1, 0.105);
 }
 
+TEST(VoxelizeStatistical, RaysThroughTheVolumeSeeWhatRaysAgainstFibersSee) {
+  const TileScene scene(crossed_layers(test_cotton()));
+  const Exemplar& exemplar = scene.exemplar();
+  double disagreement_before = 1;
+  for (const double per_radius : {1.5, 3.0, 6.0}) {
+    const IdVolume volume = voxelize(exemplar, {per_radius});
+    const IdBricks bricks(volume);
+    int both = 0;
+    int same = 0;
+    int fiber_hits = 0;
+    int volume_hits = 0;
+    double deeper = 0;
+    constexpr int kRays = 20000;
+    for (int i = 0; i < kRays; ++i) {
+      RandomStream random(3, RandomStage::kTest, 0, static_cast<std::uint64_t>(i));
+      Ray ray;
+      ray.origin = Vec3(random.uniform(), random.uniform(), exemplar.z_max + 0.01F);
+      ray.direction = -sample_hemisphere(Vec3::UnitZ(), random);
+      if (ray.direction.z() > -0.3F) continue;  // grazing rays tell fibers apart by less than any voxel
+      const auto by_fibers = scene.intersect(ray, kNoFiber);
+      const auto by_volume = bricks.first_hit(ray);
+      fiber_hits += by_fibers.has_value();
+      volume_hits += by_volume.has_value();
+      if (!by_fibers || !by_volume) continue;
+      ++both;
+      if (exemplar.segment_fiber[by_fibers->segment] != exemplar.segment_fiber[by_volume->segment]) continue;
+      ++same;
+      deeper += (by_volume->t - by_fibers->t) * -ray.direction.z();
+    }
+    // Silhouettes are off by a fraction of a voxel, so the share of rays that see another fiber falls in proportion to its edge.
+    const double disagreement = 1 - static_cast<double>(same) / both;
+    std::printf("  %.1f voxels per radius: %.2f %% see another fiber, %.3f voxels deeper, hits %+.2f %%\n", per_radius,
+                100 * disagreement, deeper / same / volume.voxel_mm[2],
+                100.0 * (volume_hits - fiber_hits) / fiber_hits);
+    EXPECT_LT(disagreement, 0.75 * disagreement_before);
+    EXPECT_LT(disagreement, 0.25 / per_radius);
+    // Samples are half a slice apart from the surface on average.
+    EXPECT_NEAR(deeper / same / volume.voxel_mm[2], 0, 1);
+    EXPECT_NEAR(volume_hits, fiber_hits, 0.02 * fiber_hits);
+    disagreement_before = disagreement;
+  }
+}
+
 TEST(Voxelize, SettingsComeFromTheSection) {
-  EXPECT_DOUBLE_EQ(
-      read_volume_settings(TomlTable::parse("voxels_per_radius = 2.5", "f.toml")).voxels_per_radius, 2.5);
+  EXPECT_DOUBLE_EQ(read_volume_settings(TomlTable::parse("voxels_per_radius = 2.5", "f.toml")).voxels_per_radius, 2.5);
   EXPECT_THROW(read_volume_settings(TomlTable::parse("voxels_per_radius = 0", "f.toml")), ConfigError);
   EXPECT_THROW(voxelize(three_fibers(), {1000}), ConfigError);
 }
