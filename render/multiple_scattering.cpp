@@ -24,24 +24,98 @@ Mat3 wo_space(const Vec3& tangent, const Vec3& wo) {
   return axes;
 }
 
+namespace {
+
+// Strata of a Gaussian's mass in its polar and azimuthal angle, from which its part over the horizon is projected.
+constexpr int kPolar = 64;
+constexpr int kAzimuths = 64;
+
+// Inverse of the distribution of cos(angle to the axis) under a normalised spherical Gaussian.
+double cosine_of_share(double share, double sharpness) {
+  if (sharpness < 1e-4) return 1 - 2 * share;
+  return 1 + std::log1p(-share * -std::expm1(-2 * sharpness)) / sharpness;
+}
+
+}  // namespace
+
 MultipleScattering::LightShape::LightShape(std::optional<float> sharpness) : directional_(!sharpness) {
   band_.fill(1);
   if (!sharpness) return;
   const std::vector<double> ratios = spherical_bessel_ratios(kMaxShOrder, *sharpness);
   std::transform(ratios.begin(), ratios.end(), band_.begin(), [](double a) { return static_cast<float>(a); });
+
+  constexpr int kCount = sh_count(kMaxShOrder);
+  upper_.assign(static_cast<std::size_t>(kInclinations) * kCount, 0.0F);
+  std::array<double, kCount> y;
+  for (int row = 0; row < kInclinations; ++row) {
+    const double inclination = kPi * row / (kInclinations - 1);
+    const Vec3d axis(std::sin(inclination), 0, std::cos(inclination));
+    const Vec3d side(std::cos(inclination), 0, -std::sin(inclination));
+    std::array<double, kCount> sum{};
+    for (int p = 0; p < kPolar; ++p) {
+      const double cosine = cosine_of_share((p + 0.5) / kPolar, *sharpness);
+      const double sine = std::sqrt(std::max(0.0, 1 - cosine * cosine));
+      for (int a = 0; a < kAzimuths; ++a) {
+        const double azimuth = 2 * kPi * (a + 0.5) / kAzimuths;
+        const Vec3d w = cosine * axis + sine * (std::cos(azimuth) * side + std::sin(azimuth) * Vec3d(0, 1, 0));
+        if (w.z() <= 0) continue;
+        evaluate_sh(kMaxShOrder, w, y.data());
+        for (int j = 0; j < kCount; ++j) sum[static_cast<std::size_t>(j)] += y[static_cast<std::size_t>(j)];
+      }
+    }
+    for (int l = 0; l <= kMaxShOrder; ++l) {
+      for (int m = (l + 1) % 2; m <= l; m += 2) {
+        const int j = l * (l + 1) + m;
+        upper_[static_cast<std::size_t>(row * kCount + j)] =
+            static_cast<float>(2 * sum[static_cast<std::size_t>(j)] / (kPolar * kAzimuths));
+      }
+    }
+  }
+}
+
+void MultipleScattering::LightShape::project(int order, bool both_sides, const Vec3& axis, float* coefficients) const {
+  if (both_sides || directional_) {
+    if (!both_sides && !(axis.z() > 0)) {
+      std::fill_n(coefficients, sh_count(order), 0.0F);
+      return;
+    }
+    evaluate_sh(order, axis, coefficients);
+    for (int l = 0; l <= order; ++l) {
+      for (int m = -l; m <= l; ++m) {
+        const float parity = (l + m) % 2 == 0 ? 0.0F : 2.0F;
+        coefficients[l * (l + 1) + m] *= both_sides ? band_[static_cast<std::size_t>(l)] : parity;
+      }
+    }
+    return;
+  }
+  const float place = std::acos(std::clamp(axis.z(), -1.0F, 1.0F)) * (kInclinations - 1) / kPif;
+  const int row = std::min(static_cast<int>(place), kInclinations - 2);
+  const float share = place - static_cast<float>(row);
+  const float* low = upper_.data() + static_cast<std::ptrdiff_t>(row) * sh_count(kMaxShOrder);
+  const float* high = low + sh_count(kMaxShOrder);
+  // The axis' azimuth: cos and sin of its multiples by recurrence.
+  const float across = std::hypot(axis.x(), axis.y());
+  const float c1 = across > 0 ? axis.x() / across : 1.0F;
+  const float s1 = across > 0 ? axis.y() / across : 0.0F;
+  float c = 1;
+  float s = 0;
+  for (int m = 0; m <= order; ++m) {
+    for (int l = m; l <= order; ++l) {
+      const int j = l * (l + 1);
+      const float value = low[j + m] + share * (high[j + m] - low[j + m]);
+      coefficients[j + m] = value * c;
+      if (m > 0) coefficients[j - m] = value * s;
+    }
+    const float next = c * c1 - s * s1;
+    s = s * c1 + c * s1;
+    c = next;
+  }
 }
 
 void MultipleScattering::incoming(std::uint32_t cell, const LightShape& light, const Vec3& axis,
                                   IncomingField& field) const {
-  if (light.directional_ && !transfer_->both_sides && !(axis.z() > 0)) {
-    std::fill_n(field.begin(), 3 * transfer_->coefficients(), 0.0F);
-    return;
-  }
   std::array<float, sh_count(kMaxShOrder)> coefficients;
-  evaluate_sh(transfer_->order, axis, coefficients.data());
-  for (int l = 0; l <= transfer_->order; ++l) {
-    for (int j = l * l; j < (l + 1) * (l + 1); ++j) coefficients[j] *= light.band_[l];
-  }
+  light.project(transfer_->order, transfer_->both_sides, axis, coefficients.data());
   transfer_->incoming(cell, coefficients.data(), field.data());
 }
 

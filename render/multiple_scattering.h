@@ -10,13 +10,18 @@
 //
 // A truncated expansion rings: an incoming field, and with it the outgoing radiance, can be slightly negative. Signs are
 // kept, so that sums over samples have the expansion's mean; who shows a picture may clamp it.
-// Under light from the face only, the transfer is 0 for light from below; its expansion is not, so directional light from
-// below is cut here.
+// Under light from the face only, the transfer is 0 for light from below, and falls to 0 about linearly as light nears the
+// horizon, where it no longer gets in between the fibers. An expansion of a function with such a bend loses light near it
+// (flat gabardine, light at 70 degrees: 13 % too dark). So the transfer is continued oddly, T(x, y, -z) = -T(x, y, z), which
+// has no bend and needs no other data: its odd coefficients (l + m odd) are twice the stored ones, its even ones 0.
+// Light is projected over the upper hemisphere only, where both agree: c_light[j] = 2 [l + m odd] integral over z > 0 of
+// L Y_j. Measured on gabardine: truncation alone 3.6 instead of 6.8 % (an even continuation makes it worse).
 // Tested in tests/render/multiple_scattering_test.cpp.
 
 #include <array>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "fibers/baked/transfer.h"
 #include "fibers/math/spherical_harmonics.h"
@@ -35,15 +40,23 @@ class MultipleScattering {
   MultipleScattering(const Transfer& transfer, std::span<const BcsdfTable> materials)
       : transfer_(&transfer), materials_(materials) {}
 
-  /// A light's shape: band factors A_l, computed once for all samples. Without a sharpness: directional.
+  /// A light's shape, computed once for all samples: band factors A_l for light from both sides, and for light from the
+  /// face a table of the projection over the upper hemisphere by the inclination of the axis. Without a sharpness:
+  /// directional.
   class LightShape {
    public:
     explicit LightShape(std::optional<float> sharpness);
 
+    /// c_light for a light about `axis` (unit, fabric space): [sh_count(order)].
+    void project(int order, bool both_sides, const Vec3& axis, float* coefficients) const;
+
    private:
-    friend class MultipleScattering;
+    // Rows of upper_, for axis inclinations from +z in equal steps; between them, linear interpolation (error below 2e-3 of
+    // the largest coefficient, as its test measures).
+    static constexpr int kInclinations = 129;
     bool directional_;
     std::array<float, kMaxShOrder + 1> band_;  // [l]
+    std::vector<float> upper_;  // [inclination][j] of a light whose axis lies in the xz plane; m < 0 and even l + m are 0
   };
 
   /// Field at `cell` under a light about `axis` (unit, fabric space).

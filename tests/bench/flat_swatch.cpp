@@ -222,7 +222,13 @@ class Swatch {
     }
     const Rgbd carried = 4 * kPi * scale * escape->throughput.cast<double>() * seen;
     for (int l = 0; l < kLights; ++l) {
-      sum[l] += reproducing_kernel(order, escape->direction.dot(lights_[l])) * carried;
+      double kernel = reproducing_kernel(order, escape->direction.dot(lights_[l]));
+      if (!pack_.light_from_both_sides) {
+        // The odd continuation of render/multiple_scattering.h.
+        const Vec3 mirrored(lights_[l].x(), lights_[l].y(), -lights_[l].z());
+        kernel -= reproducing_kernel(order, escape->direction.dot(mirrored));
+      }
+      sum[l] += kernel * carried;
     }
   }
 

@@ -145,7 +145,7 @@ TEST(MultipleScatteringAgreement, RotatedDotProductEqualsQuadratureOfTheTruncate
 
 TEST(MultipleScatteringAgreement, LightShapeIsTheProjectionOfTheNormalisedGaussian) {
   const std::vector<BcsdfTable> materials;
-  const Transfer transfer = diagonal_transfer(5, {1, 1, 1}, false);
+  const Transfer transfer = diagonal_transfer(5, {1, 1, 1}, true);
   const MultipleScattering multiple(transfer, materials);
   const Vec3 axis = Vec3(0.3F, -0.5F, 0.7F).normalized();
   for (const float sharpness : {0.0F, 0.5F, 10.0F, 60.0F}) {
@@ -160,6 +160,71 @@ TEST(MultipleScatteringAgreement, LightShapeIsTheProjectionOfTheNormalisedGaussi
       });
       EXPECT_NEAR(field[static_cast<std::size_t>(3 * j)], expected[0], 2e-6) << sharpness << ' ' << j;
     }
+  }
+}
+
+// Light from the face: twice the projection over the upper hemisphere, odd coefficients (l + m) only. The table's strata and rows
+// cost up to 1.5 % of the largest coefficient where a Gaussian straddles the horizon (64 strata across the step).
+TEST(MultipleScatteringAgreement, FaceLightIsProjectedOverTheUpperHemisphereOddly) {
+  for (const float sharpness : {0.0F, 2.0F, 30.0F, 150.0F}) {
+    const MultipleScattering::LightShape shape(sharpness);
+    for (const Vec3& axis : {Vec3(0.3F, -0.5F, 0.7F), Vec3(-0.9F, 0.2F, 0.05F), Vec3(0.4F, 0.6F, -0.1F), Vec3(0, 0, 1)}) {
+      const Vec3 unit = axis.normalized();
+      std::array<float, sh_count(5)> got;
+      shape.project(5, false, unit, got.data());
+      std::array<double, sh_count(5)> expected{};
+      const int rings = 400;
+      const int azimuths = 800;
+      for (int r = 0; r < rings; ++r) {
+        const double z = (r + 0.5) / rings;
+        for (int a = 0; a < azimuths; ++a) {
+          const double phi = 2 * kPi * (a + 0.5) / azimuths;
+          const Vec3d w(std::sqrt(1 - z * z) * std::cos(phi), std::sqrt(1 - z * z) * std::sin(phi), z);
+          std::array<double, sh_count(5)> y;
+          evaluate_sh(5, w, y.data());
+          const double light = sg_value({unit.cast<double>(), sharpness}, w) / sg_mass(static_cast<double>(sharpness)) *
+                               2 * kPi / rings / azimuths;
+          for (int l = 0; l <= 5; ++l) {
+            for (int m = -l; m <= l; ++m) {
+              if ((l + m) % 2 == 0) continue;
+              const auto j = static_cast<std::size_t>(l * (l + 1) + m);
+              expected[j] += 2 * light * y[j];
+            }
+          }
+        }
+      }
+      for (std::size_t j = 0; j < got.size(); ++j) {
+        EXPECT_NEAR(got[j], expected[j], 0.015) << sharpness << ", axis " << unit.transpose() << ", " << j;
+      }
+    }
+  }
+}
+
+// What it is for: a response that falls to 0 at the horizon is kept for light near the horizon. Response T(w) = w.z over the
+// face (Lambert's law): stored coefficients are its projection; continued oddly, every direction above gets its cosine.
+TEST(MultipleScatteringLaw, ACosineResponseHoldsDownToTheHorizon) {
+  Transfer transfer = diagonal_transfer(5, {0, 0, 0}, false);
+  std::array<double, sh_count(5)> stored{};
+  for (int r = 0; r < 2000; ++r) {
+    for (int a = 0; a < 64; ++a) {
+      const double z = (r + 0.5) / 2000;
+      const double phi = 2 * kPi * (a + 0.5) / 64;
+      std::array<double, sh_count(5)> y;
+      evaluate_sh(5, Vec3d(std::sqrt(1 - z * z) * std::cos(phi), std::sqrt(1 - z * z) * std::sin(phi), z), y.data());
+      for (std::size_t j = 0; j < stored.size(); ++j) stored[j] += z * y[j] * 2 * kPi / 2000 / 64;
+    }
+  }
+  for (std::size_t j0 = 0; j0 < stored.size(); ++j0) {
+    transfer.matrices[j0 * sh_count(5) * 3] = static_cast<float>(stored[j0]);  // into j1 = 0, red
+  }
+  const std::vector<BcsdfTable> materials;
+  const MultipleScattering multiple(transfer, materials);
+  const MultipleScattering::LightShape directional(std::nullopt);
+  for (const double degrees_from_normal : {0.0, 40.0, 70.0, 85.0, 89.0}) {
+    const double t = radians(degrees_from_normal);
+    IncomingField field;
+    multiple.incoming(0, directional, Vec3d(std::sin(t), 0, std::cos(t)).cast<float>(), field);
+    EXPECT_NEAR(field[0], std::cos(t), 1e-3) << degrees_from_normal;
   }
 }
 
