@@ -51,6 +51,7 @@ wander_rms_deg = 3
 
 [transfer]
 order = 2
+cell_mean_free_paths = 2.5
 min_paths = 4096
 max_paths = 4096
 
