@@ -356,8 +356,7 @@ std::unique_ptr<FabricStages::TransferWork> FabricStages::transfer_work(const Tr
   const double mean_free_path = scene().mean_free_path(settings.seed, kMeanFreePathSamples);
   const Exemplar& cloth = exemplar();
   const CellGrid grid = make_cell_grid(cloth.width_mm, cloth.height_mm, cloth.z_min, cloth.z_max,
-                                       static_cast<float>(settings.cell_mean_free_paths * mean_free_path),
-                                       static_cast<float>(settings.cell_depth_mean_free_paths * mean_free_path));
+                                       static_cast<float>(settings.cell_mean_free_paths * mean_free_path));
   work->baker.emplace(scene(), work->materials, origins(), settings, grid);
   return work;
 }

@@ -31,7 +31,6 @@ TransferSettings read_transfer_settings(const TomlTable& section) {
   TransferSettings settings;
   settings.order = static_cast<int>(section.integer("order", 0, 5, 5));
   settings.cell_mean_free_paths = section.number("cell_mean_free_paths", {.min = 0.25, .max = 100}, 4.0);
-  settings.cell_depth_mean_free_paths = section.number("cell_depth_mean_free_paths", {.min = 0.25, .max = 100}, 4.0);
   settings.min_paths = static_cast<int>(section.integer("min_paths", 1, 100'000'000, 4096));
   settings.max_paths = static_cast<int>(section.integer("max_paths", 1, 100'000'000, 32768));
   if (settings.max_paths < settings.min_paths) section.fail("max_paths", "expected at least min_paths");

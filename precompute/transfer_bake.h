@@ -28,8 +28,7 @@ namespace heddle {
 
 struct TransferSettings {
   int order = 5;                    // SH bands 0 .. order, light and incoming alike
-  double cell_mean_free_paths = 1;        // edge of a cell along x and y, in mean free paths
-  double cell_depth_mean_free_paths = 1;  // along z, where light changes fastest
+  double cell_mean_free_paths = 1;  // edge of a cell in mean free paths
   int min_paths = 0;                // per cell, rounded up to whole batches
   int max_paths = 0;
   double target_error = 0;          // rms standard error of the matrix' entries relative to a[0][0], brightest colour

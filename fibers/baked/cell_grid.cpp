@@ -16,9 +16,9 @@ std::uint32_t CellGrid::cell_of(const Vec3& position) const {
   return static_cast<std::uint32_t>((z * cells[1] + y) * cells[0] + x);
 }
 
-CellGrid make_cell_grid(float width_mm, float height_mm, float z_min, float z_max, float edge_mm, float depth_mm) {
-  auto count = [](float length, float cell) { return std::max(1, static_cast<int>(std::lround(length / cell))); };
-  return {{count(width_mm, edge_mm), count(height_mm, edge_mm), count(z_max - z_min, depth_mm)}, width_mm, height_mm, z_min, z_max};
+CellGrid make_cell_grid(float width_mm, float height_mm, float z_min, float z_max, float edge_mm) {
+  auto count = [&](float length) { return std::max(1, static_cast<int>(std::lround(length / edge_mm))); };
+  return {{count(width_mm), count(height_mm), count(z_max - z_min)}, width_mm, height_mm, z_min, z_max};
 }
 
 }  // namespace heddle

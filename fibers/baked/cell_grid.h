@@ -21,9 +21,8 @@ struct CellGrid {
   std::uint32_t cell_of(const Vec3& position) const;
 };
 
-/// The grid whose cells come as near as possible to edge_mm (along x and y) and depth_mm (along z) with a whole number of
-/// cells along each axis.
-CellGrid make_cell_grid(float width_mm, float height_mm, float z_min, float z_max, float edge_mm, float depth_mm);
+/// The grid whose cell edges come as near as possible to `edge_mm` with a whole number of cells along each axis.
+CellGrid make_cell_grid(float width_mm, float height_mm, float z_min, float z_max, float edge_mm);
 
 }  // namespace heddle
 

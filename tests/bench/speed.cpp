@@ -183,11 +183,9 @@ void transfer_cost(const TileScene& tile, const SegmentOrigins& origins, const F
   for (const FiberScattering& fiber : tile.exemplar().scattering) materials.emplace_back(fiber);
   TransferSettings settings = fabric.transfer;
   settings.both_sides = fabric.config.light_from_both_sides;
-  const double mean_free_path = tile.mean_free_path(1, kMeanFreePathSamples);
-  const auto edge = static_cast<float>(settings.cell_mean_free_paths * mean_free_path);
-  const auto depth = static_cast<float>(settings.cell_depth_mean_free_paths * mean_free_path);
+  const auto edge = static_cast<float>(settings.cell_mean_free_paths * tile.mean_free_path(1, kMeanFreePathSamples));
   const Exemplar& exemplar = tile.exemplar();
-  const CellGrid grid = make_cell_grid(exemplar.width_mm, exemplar.height_mm, exemplar.z_min, exemplar.z_max, edge, depth);
+  const CellGrid grid = make_cell_grid(exemplar.width_mm, exemplar.height_mm, exemplar.z_min, exemplar.z_max, edge);
   const TransferBaker baker(tile, materials, origins, settings, grid);
   const std::uint32_t first = grid.count() / 2;
   const std::uint32_t last = std::min(first + 40, grid.count());

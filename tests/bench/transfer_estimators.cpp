@@ -69,7 +69,7 @@ void compare_estimators(const std::string& path) {
   std::vector<BcsdfTable> materials;
   for (const FiberScattering& fiber : exemplar.scattering) materials.emplace_back(fiber);
   const auto edge = static_cast<float>(scene.mean_free_path(1, 20000));
-  const CellGrid grid = make_cell_grid(exemplar.width_mm, exemplar.height_mm, exemplar.z_min, exemplar.z_max, edge, edge);
+  const CellGrid grid = make_cell_grid(exemplar.width_mm, exemplar.height_mm, exemplar.z_min, exemplar.z_max, edge);
   const TileTrace trace(scene);
   double ratio_sum = 0;
   for (int k = 0; k < kCells; ++k) {

@@ -30,7 +30,7 @@ FabricPack sound_pack() {
   Transfer transfer;
   transfer.order = 0;
   transfer.grid =
-      make_cell_grid(pack.exemplar.width_mm, pack.exemplar.height_mm, pack.exemplar.z_min, pack.exemplar.z_max, 10, 10);
+      make_cell_grid(pack.exemplar.width_mm, pack.exemplar.height_mm, pack.exemplar.z_min, pack.exemplar.z_max, 10);
   transfer.matrices = {0.1F, 0.1F, 0.1F};
   transfer.standard_error = {0, 0, 0};
   transfer.paths = {1024};

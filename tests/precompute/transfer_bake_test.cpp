@@ -31,7 +31,7 @@ TEST(TransferBakeStatistical, FurnaceBalancesVisibility) {
   const TileScene scene(exemplar);
   const std::vector<BcsdfTable> materials = {BcsdfTable(test::white_fiber())};
   const SegmentOrigins origins = find_segment_origins(scene, true, OriginChoice::kExposed, 1);
-  const CellGrid grid = make_cell_grid(exemplar.width_mm, exemplar.height_mm, exemplar.z_min, exemplar.z_max, 0.2F, 0.2F);
+  const CellGrid grid = make_cell_grid(exemplar.width_mm, exemplar.height_mm, exemplar.z_min, exemplar.z_max, 0.2F);
   const TransferSettings settings = settings_of(2, 16384, true);
   const TransferBaker baker(scene, materials, origins, settings, grid);
   const std::vector<TransferChunk> chunks = {baker.bake(0, grid.count())};
@@ -86,7 +86,7 @@ TEST(TransferBakeLaw, FaceLightIsPartOfLightFromBothSides) {
   const TileScene scene(exemplar);
   const std::vector<BcsdfTable> materials = {BcsdfTable(exemplar.scattering[0])};
   const SegmentOrigins origins = find_segment_origins(scene, false, OriginChoice::kExposed, 1);
-  const CellGrid grid = make_cell_grid(exemplar.width_mm, exemplar.height_mm, exemplar.z_min, exemplar.z_max, 0.3F, 0.3F);
+  const CellGrid grid = make_cell_grid(exemplar.width_mm, exemplar.height_mm, exemplar.z_min, exemplar.z_max, 0.3F);
   const TransferBaker face(scene, materials, origins, settings_of(0, 8192, false), grid);
   const TransferBaker both(scene, materials, origins, settings_of(0, 8192, true), grid);
   const TransferChunk a = face.bake(0, grid.count());
@@ -102,7 +102,7 @@ TEST(TransferBakeLaw, AnyCutAndAnyThreadCountGiveTheSameBits) {
   const TileScene scene(exemplar);
   const std::vector<BcsdfTable> materials = {BcsdfTable(exemplar.scattering[0])};
   const SegmentOrigins origins = find_segment_origins(scene, false, OriginChoice::kExposed, 1);
-  const CellGrid grid = make_cell_grid(exemplar.width_mm, exemplar.height_mm, exemplar.z_min, exemplar.z_max, 0.3F, 0.3F);
+  const CellGrid grid = make_cell_grid(exemplar.width_mm, exemplar.height_mm, exemplar.z_min, exemplar.z_max, 0.3F);
   const TransferBaker baker(scene, materials, origins, settings_of(1, 4096, false), grid);
   const TransferChunk whole = baker.bake(0, grid.count());
   const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
@@ -117,7 +117,7 @@ TEST(TransferBakeStatistical, StoredErrorIsTheSpreadOverSeeds) {
   const TileScene scene(exemplar);
   const std::vector<BcsdfTable> materials = {BcsdfTable(exemplar.scattering[0])};
   const SegmentOrigins origins = find_segment_origins(scene, false, OriginChoice::kExposed, 1);
-  const CellGrid grid = make_cell_grid(exemplar.width_mm, exemplar.height_mm, exemplar.z_min, exemplar.z_max, 0.3F, 0.3F);
+  const CellGrid grid = make_cell_grid(exemplar.width_mm, exemplar.height_mm, exemplar.z_min, exemplar.z_max, 0.3F);
   std::uint32_t cell = 0;
   const int seeds = 24;
   double sum = 0;

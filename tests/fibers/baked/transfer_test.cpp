@@ -11,7 +11,7 @@ namespace heddle {
 namespace {
 
 TEST(CellGridLaw, EveryPointHasTheCellItLiesIn) {
-  const CellGrid grid = make_cell_grid(2, 1, -0.1F, 0.3F, 0.11F, 0.11F);
+  const CellGrid grid = make_cell_grid(2, 1, -0.1F, 0.3F, 0.11F);
   EXPECT_EQ(grid.cells, (std::array<int, 3>{18, 9, 4}));
   for (int i = 0; i < 2000; ++i) {
     RandomStream random(1, RandomStage::kTest, 20, static_cast<std::uint64_t>(i));
@@ -31,7 +31,7 @@ TEST(CellGridLaw, EveryPointHasTheCellItLiesIn) {
 Transfer random_transfer() {
   Transfer t;
   t.order = 2;
-  t.grid = make_cell_grid(1, 1, 0, 1, 0.5F, 0.5F);
+  t.grid = make_cell_grid(1, 1, 0, 1, 0.5F);
   RandomStream random(1, RandomStage::kTest, 21, 0);
   for (std::size_t i = 0; i < 8 * 9 * 9 * 3; ++i) t.matrices.push_back(random.uniform() - 0.5F);
   t.standard_error.assign(8 * 3 * 3, 0.1F);
