@@ -6,17 +6,16 @@
 //      the id volume;
 //   2. light visibility: a shadow ray against the shells and the black meshes from the shell's surface straight above the
 //      hit (below it where the light is under the cloth), for single scattering; another from a point moved along the cloth
-//      by a 2D Gaussian, whose mean is the smoothed visibility of multiple scattering. For a spherical Gaussian the ray goes
-//      in a direction drawn from the light (the mean is a soft shadow); where the fabric takes light from its face only,
-//      from that part of the light that lies on the face's side, since the precomputed data hold no other light;
+//      by a 2D Gaussian, whose mean is the smoothed visibility of multiple scattering. For a spherical Gaussian the ray
+//      goes in a direction drawn from the light (the mean is a soft shadow); where the fabric takes light from its face
+//      only, from that part of the light that lies on the face's side, since the precomputed data hold no other light;
 //   3. shading, sorted by cell and tetrahedron: single_scattering.h, multiple_scattering.h. Incoming fields of all lights
 //      are summed before they are turned and scattered, and are kept while cell and light direction stay the same.
-//
-// Not modelled: light between different parts of the cloth, and the shell's bend between the fibers of one cell.
+// What is not modelled: light between different parts of the cloth, and the shell's bend between two fibers of one cell.
 // Signs of multiple scattering are kept (see multiple_scattering.h): a dark pixel can be slightly negative.
 // Eye rays are those of the path tracer with the same seed. Random numbers are addressed by pixel of the full frame and
-// sample, and sums run in sample order: the picture depends neither on threads nor on the crop. Tested in
-// tests/render/precomputed_renderer_test.cpp.
+// sample, and sums run in sample order: the picture depends neither on threads nor on the crop.
+// Tested in tests/render/precomputed_renderer_test.cpp.
 
 #include <cstdint>
 #include <memory>
@@ -39,8 +38,8 @@ namespace heddle {
 struct PrecomputedSettings {
   std::uint64_t seed = 1;
   bool volume = false;  // eye rays through the packs' id volumes instead of against fibers
-  std::optional<double>
-      shadow_sigma_mm;  // deviation of the Gaussian; the thickness of the cloth where absent
+  // Deviation of the Gaussian; the thickness of the cloth where absent.
+  std::optional<double> shadow_sigma_mm;
 };
 
 class PrecomputedRenderer {

@@ -14,7 +14,7 @@
 //   floor     exact, with the single scattering of the reference, and multiple scattering by the transfer to the hit point
 //             itself, to the same SH order: what the truncation alone costs. K paths from the hit point per eye ray, each
 //             4 pi * throughput * K(w0 . light) * sum over j of Y_j(w1) c_S[j], K the reproducing kernel
-//             sum of (2 l + 1) / 4 pi P_l.
+//             sum of (2 l + 1) / 4 pi P_l (less that of the mirrored light where the transfer is continued oddly).
 //
 // Error: sqrt(mean of (F1 - R1)(F2 - R2)) / mean R, where 1 and 2 are two independent halves of all samples, so that
 // neither the reference's noise nor the methods' own counts. A method shares eye rays with the half of the reference it is
