@@ -12,6 +12,7 @@
 #include "formats/input_error.h"
 #include "formats/tensor_file.h"
 #include "tests/support/fabrics.h"
+#include "tests/support/temporary_folder.h"
 
 namespace heddle {
 namespace {
@@ -138,8 +139,8 @@ TEST(VisibilityMapsEndToEnd, SameForAnyNumberOfThreadsAndChunks) {
 
 class VisibilityMapsFormat : public testing::Test {
  protected:
-  std::filesystem::path path_ = std::filesystem::path(testing::TempDir()) / "heddle_maps_test.safetensors";
-  void TearDown() override { std::filesystem::remove(path_); }
+  TemporaryFolder temporary_;
+  std::filesystem::path path_ = temporary_.path() / "maps.safetensors";
 };
 
 TEST_F(VisibilityMapsFormat, RoundTrip) {

@@ -5,6 +5,7 @@
 #include <fstream>
 
 #include "formats/input_error.h"
+#include "tests/support/temporary_folder.h"
 
 namespace heddle {
 namespace {
@@ -13,8 +14,6 @@ namespace {
 class SceneConfigTest : public testing::Test {
  protected:
   void SetUp() override {
-    folder_ = std::filesystem::path(testing::TempDir()) / "heddle_scene_config_test";
-    std::filesystem::create_directories(folder_);
     std::ofstream(folder_ / "drape.obj") << "v 0 0 0\n";
     std::ofstream(folder_ / "silk.toml") << "name = \"silk\"\n";
   }
@@ -31,7 +30,8 @@ class SceneConfigTest : public testing::Test {
     }
     return "";
   }
-  std::filesystem::path folder_;
+  TemporaryFolder temporary_;
+  std::filesystem::path folder_ = temporary_.path();
 };
 
 const std::string kScene = R"(name = "test"

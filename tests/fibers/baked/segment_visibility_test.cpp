@@ -7,6 +7,7 @@
 
 #include "fibers/math/sampling.h"
 #include "formats/input_error.h"
+#include "tests/support/temporary_folder.h"
 
 namespace heddle {
 namespace {
@@ -91,8 +92,8 @@ TEST(SsdfVisibility, MinusPiWhereNothingIsSeen) {
 
 class SegmentVisibilityFormat : public testing::Test {
  protected:
-  std::filesystem::path path_ = std::filesystem::path(testing::TempDir()) / "heddle_segment_visibility.safetensors";
-  void TearDown() override { std::filesystem::remove(path_); }
+  TemporaryFolder folder_;
+  std::filesystem::path path_ = folder_.path() / "visibility.safetensors";
 
   static SgVisibility some_sgs() {
     SgVisibility sgs;

@@ -6,6 +6,7 @@
 
 #include "fibers/baked/cell_grid.h"
 #include "fibers/math/random.h"
+#include "tests/support/temporary_folder.h"
 
 namespace heddle {
 namespace {
@@ -57,10 +58,10 @@ TEST(TransferLaw, IncomingSumsOverTheLightIndex) {
 
 TEST(TransferFormat, RoundTrip) {
   const Transfer a = random_transfer();
-  const std::filesystem::path path = std::filesystem::temp_directory_path() / "heddle_transfer_test.safetensors";
+  const TemporaryFolder folder;
+  const std::filesystem::path path = folder.path() / "transfer.safetensors";
   write_transfer(path, a, {});
   const Transfer b = read_transfer(path);
-  std::filesystem::remove(path);
   EXPECT_EQ(a.matrices, b.matrices);
   EXPECT_EQ(a.standard_error, b.standard_error);
   EXPECT_EQ(a.grid.cells, b.grid.cells);

@@ -8,16 +8,17 @@
 #include "fibers/cloth/synthesize.h"
 #include "formats/input_error.h"
 #include "tests/support/fabrics.h"
+#include "tests/support/temporary_folder.h"
 
 namespace heddle {
 namespace {
 
 TEST(ExemplarFormat, RoundTripKeepsEveryBit) {
   const Exemplar a = synthesize(test::small_fabric());
-  const std::filesystem::path path = std::filesystem::temp_directory_path() / "heddle_exemplar_test.safetensors";
+  const TemporaryFolder folder;
+  const std::filesystem::path path = folder.path() / "fibers.safetensors";
   write_exemplar(path, a, {{"key", "k"}});
   const Exemplar b = read_exemplar(path);
-  std::filesystem::remove(path);
   EXPECT_EQ(a.points, b.points);
   EXPECT_EQ(a.first_point, b.first_point);
   EXPECT_EQ(a.radius_mm, b.radius_mm);
