@@ -20,8 +20,8 @@ double section(double distance, double half_width) {
   return std::sqrt(std::max(0.0, 1 - u * u));
 }
 
-// Calls f(warp yarn, weft yarn, distance across the warp, across the weft, sign of warp over weft) on a grid over every
-// crossing of the tile, wherever both yarns are present.
+// Calls f(gap between the two axes, gap that the two sections need), vertical, mm, on a grid over every crossing of the tile.
+// The gap is negative where the yarns lie the wrong way round.
 template <class F>
 void for_each_crossing_point(const FabricConfig& config, const YarnPaths& paths, int samples, F&& f) {
   const double a_warp = 0.5 * config.warp.width_mm;
@@ -33,7 +33,9 @@ void for_each_crossing_point(const FabricConfig& config, const YarnPaths& paths,
         const double dy = a_weft * (2.0 * iy / (samples - 1) - 1);
         for (int ix = 0; ix < samples; ++ix) {
           const double dx = a_warp * (2.0 * ix / (samples - 1) - 1);
-          f(paths.warp[end], paths.weft[pick], dx, dy, sign);
+          const double gap = sign * (paths.warp[end].height_at(paths.weft[pick].across_mm + dy) -
+                                     paths.weft[pick].height_at(paths.warp[end].across_mm + dx));
+          f(gap, 0.5 * (config.warp.height_mm * section(dx, a_warp) + config.weft.height_mm * section(dy, a_weft)));
         }
       }
     }
@@ -76,16 +78,10 @@ YarnPaths lay_yarns(const FabricConfig& config) {
 
   // Heights scale with the crests, so each point asks for a smallest factor: needed gap / gap at factor 1.
   double factor = 1;
-  for_each_crossing_point(config, paths, kSolveSamples,
-                          [&](const YarnPath& warp, const YarnPath& weft, double dx, double dy, double sign) {
-                            const double gap = sign * (warp.height_at(weft.across_mm + dy) -
-                                                       weft.height_at(warp.across_mm + dx));
-                            const double needed =
-                                0.5 * config.warp.height_mm * section(dx, 0.5 * config.warp.width_mm) +
-                                0.5 * config.weft.height_mm * section(dy, 0.5 * config.weft.width_mm);
-                            if (needed <= 1e-9) return;
-                            factor = gap > 0 ? std::max(factor, needed / gap) : 2 * kLargestCrestFactor;
-                          });
+  for_each_crossing_point(config, paths, kSolveSamples, [&](double gap, double needed) {
+    if (needed <= 1e-9) return;
+    factor = gap > 0 ? std::max(factor, needed / gap) : 2 * kLargestCrestFactor;
+  });
   if (factor > kLargestCrestFactor) {
     throw std::invalid_argument(
         "warp and weft cannot pass each other without overlapping: make width_mm smaller against spacing_mm");
@@ -102,14 +98,7 @@ YarnPaths lay_yarns(const FabricConfig& config) {
 double smallest_clearance(const FabricConfig& config, const YarnPaths& paths, int samples) {
   double smallest = std::numeric_limits<double>::infinity();
   for_each_crossing_point(config, paths, samples,
-                          [&](const YarnPath& warp, const YarnPath& weft, double dx, double dy, double sign) {
-                            const double gap = sign * (warp.height_at(weft.across_mm + dy) -
-                                                       weft.height_at(warp.across_mm + dx));
-                            const double needed =
-                                0.5 * config.warp.height_mm * section(dx, 0.5 * config.warp.width_mm) +
-                                0.5 * config.weft.height_mm * section(dy, 0.5 * config.weft.width_mm);
-                            smallest = std::min(smallest, gap - needed);
-                          });
+                          [&](double gap, double needed) { smallest = std::min(smallest, gap - needed); });
   return smallest;
 }
 
