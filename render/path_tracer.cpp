@@ -93,15 +93,8 @@ std::vector<BcsdfTable> scene_materials(const ClothScene& scene) {
 FrameBuffers trace_picture(const PathTracer& tracer, const Camera& camera, const PixelRect& crop,
                            std::uint64_t seed, const SampleBudget& budget, const RenderProgress& progress) {
   assert(budget.seconds || (budget.spp >= 2 && budget.spp % 2 == 0));
-  struct Sums {
-    Rgbd single = Rgbd::Zero();
-    Rgbd multiple = Rgbd::Zero();
-    Rgbd half[2] = {Rgbd::Zero(), Rgbd::Zero()};
-    Rgbd squares = Rgbd::Zero();
-    double alpha = 0;
-  };
   const int pixel_count = crop.width * crop.height;
-  std::vector<Sums> sums(static_cast<std::size_t>(pixel_count));
+  std::vector<PixelSums> sums(static_cast<std::size_t>(pixel_count));
 
   const auto pass = [&](int first_sample, int last_sample) {
     // 16 pixels: long enough to pay for a task, short enough to share out a few expensive ones.
@@ -111,19 +104,13 @@ FrameBuffers trace_picture(const PathTracer& tracer, const Camera& camera, const
         const int y = crop.y0 + k / crop.width;
         const auto pixel = static_cast<std::uint64_t>(y) * static_cast<std::uint64_t>(camera.width()) +
                            static_cast<std::uint64_t>(x);
-        Sums& sum = sums[static_cast<std::size_t>(k)];
+        PixelSums& sum = sums[static_cast<std::size_t>(k)];
         for (int s = first_sample; s < last_sample; ++s) {
           RandomStream eye(seed, RandomStage::kEyeRay, pixel, static_cast<std::uint64_t>(s));
           RandomStream random(seed, RandomStage::kPathTracer, pixel, static_cast<std::uint64_t>(s));
           const double px = x + eye.uniform_double();
           const double py = y + eye.uniform_double();
-          const PathTracer::Sample sample = tracer.trace(camera.ray(px, py), random);
-          const Rgbd total = (sample.single + sample.multiple + sample.background).cast<double>();
-          sum.single += sample.single.cast<double>();
-          sum.multiple += sample.multiple.cast<double>();
-          sum.half[s % 2] += total;
-          sum.squares += total * total;
-          sum.alpha += static_cast<double>(sample.alpha);
+          sum.add(tracer.trace(camera.ray(px, py), random), s);
         }
       }
     });
@@ -146,18 +133,7 @@ FrameBuffers trace_picture(const PathTracer& tracer, const Camera& camera, const
   frame.half0.resize(sums.size());
   frame.half1.resize(sums.size());
   frame.variance.resize(sums.size());
-  for (std::size_t k = 0; k < sums.size(); ++k) {
-    const Sums& sum = sums[k];
-    const double n = done;
-    const Rgbd mean = (sum.half[0] + sum.half[1]) / n;
-    frame.beauty[k] = mean.cast<float>();
-    frame.single[k] = (sum.single / n).cast<float>();
-    frame.multiple[k] = (sum.multiple / n).cast<float>();
-    frame.alpha[k] = static_cast<float>(sum.alpha / n);
-    frame.half0[k] = (sum.half[0] / (0.5 * n)).cast<float>();
-    frame.half1[k] = (sum.half[1] / (0.5 * n)).cast<float>();
-    frame.variance[k] = ((sum.squares / n - mean * mean).max(0.0) / (n - 1)).cast<float>();
-  }
+  for (std::size_t k = 0; k < sums.size(); ++k) sums[k].store(done, k, frame);
   return frame;
 }
 

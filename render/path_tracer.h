@@ -22,6 +22,7 @@
 #include "render/cloth_scene.h"
 #include "render/cloth_trace.h"
 #include "render/lights.h"
+#include "render/pixel_sums.h"
 #include "render/render_output.h"
 
 namespace heddle {
@@ -43,12 +44,7 @@ class PathTracer {
   PathTracer(const ClothScene& scene, std::span<const BcsdfTable> materials, std::span<const Light> lights,
              const Rgb& background, const PathTracerSettings& settings);
 
-  struct Sample {
-    Rgb single = Rgb::Zero();
-    Rgb multiple = Rgb::Zero();
-    Rgb background = Rgb::Zero();
-    float alpha = 0;  // 1 where the eye ray meets cloth or a mesh
-  };
+  using Sample = EyeSample;
   /// Radiance that comes back along one eye ray.
   Sample trace(const EyeRay& ray, RandomStream& random) const;
   /// The same for light leaving a known vertex towards `wo`.

@@ -222,13 +222,6 @@ FrameBuffers shade_picture(const PrecomputedRenderer& renderer, const Camera& ca
     frame.variance.resize(count);
   }
 
-  struct Sums {
-    Rgbd single = Rgbd::Zero();
-    Rgbd multiple = Rgbd::Zero();
-    Rgbd half[2] = {Rgbd::Zero(), Rgbd::Zero()};
-    Rgbd squares = Rgbd::Zero();
-    double alpha = 0;
-  };
   const int columns = (crop.width + kBlockEdge - 1) / kBlockEdge;
   const int rows = (crop.height + kBlockEdge - 1) / kBlockEdge;
   const auto shade_block = [&](int index) {
@@ -237,39 +230,20 @@ FrameBuffers shade_picture(const PrecomputedRenderer& renderer, const Camera& ca
     const PixelRect block = {crop.x0 + left, crop.y0 + top, std::min(kBlockEdge, crop.width - left),
                              std::min(kBlockEdge, crop.height - top)};
     const int pixels = block.width * block.height;
-    std::vector<Sums> sums(static_cast<std::size_t>(pixels));
+    std::vector<PixelSums> sums(static_cast<std::size_t>(pixels));
     std::vector<PrecomputedRenderer::Sample> samples;
     std::vector<std::optional<PrecomputedRenderer::Seen>> seen;
     for (int first = 0; first < spp; first += kBlockSamples) {
       const int last = std::min(spp, first + kBlockSamples);
       renderer.shade(camera, block, first, last, samples, seen);
       for (int i = 0; i < pixels * (last - first); ++i) {
-        const PrecomputedRenderer::Sample& sample = samples[i];
-        const int s = first + i % (last - first);
-        Sums& sum = sums[i / (last - first)];
-        const Rgbd total = (sample.single + sample.multiple + sample.background).cast<double>();
-        sum.single += sample.single.cast<double>();
-        sum.multiple += sample.multiple.cast<double>();
-        sum.half[s % 2] += total;
-        sum.squares += total * total;
-        sum.alpha += sample.alpha;
+        sums[i / (last - first)].add(samples[i], first + i % (last - first));
       }
     }
     for (int p = 0; p < pixels; ++p) {
-      const Sums& sum = sums[p];
-      const double n = spp;
       const std::size_t k =
           static_cast<std::size_t>(top + p / block.width) * crop.width + left + p % block.width;
-      const Rgbd mean = (sum.half[0] + sum.half[1]) / n;
-      frame.beauty[k] = mean.cast<float>();
-      frame.single[k] = (sum.single / n).cast<float>();
-      frame.multiple[k] = (sum.multiple / n).cast<float>();
-      frame.alpha[k] = static_cast<float>(sum.alpha / n);
-      if (spp >= 2) {
-        frame.half0[k] = (sum.half[0] / ((spp + 1) / 2)).cast<float>();
-        frame.half1[k] = (sum.half[1] / (spp / 2)).cast<float>();
-        frame.variance[k] = ((sum.squares / n - mean * mean).max(0.0) / (n - 1)).cast<float>();
-      }
+      sums[p].store(spp, k, frame);
       if (!seen[p]) continue;
       frame.segment[k] = seen[p]->segment;
       frame.cell[k] = seen[p]->cell;

@@ -30,6 +30,7 @@
 #include "render/lights.h"
 #include "render/multiple_scattering.h"
 #include "render/path_tracer.h"
+#include "render/pixel_sums.h"
 #include "render/render_output.h"
 #include "render/single_scattering.h"
 
@@ -50,13 +51,7 @@ class PrecomputedRenderer {
                       std::span<const Light> lights, const Rgb& background,
                       const PrecomputedSettings& settings);
 
-  /// One eye ray's result.
-  struct Sample {
-    Rgb single = Rgb::Zero();
-    Rgb multiple = Rgb::Zero();
-    Rgb background = Rgb::Zero();
-    float alpha = 0;  // 1 where the eye ray meets cloth or a mesh
-  };
+  using Sample = EyeSample;
   /// What the first sample of a pixel sees; empty where that is no cloth.
   struct Seen {
     std::uint32_t segment;

@@ -34,7 +34,7 @@ struct FrameBuffers {
   std::vector<Rgb> multiple;  // [pixel]
   std::vector<float> alpha;   // [pixel] share of eye rays that meet cloth or a mesh
 
-  // Path tracer only, else empty.
+  // With 2 samples per pixel or more, else empty.
   std::vector<Rgb> half0;     // [pixel] beauty of the even samples
   std::vector<Rgb> half1;     // [pixel] beauty of the odd samples
   std::vector<Rgb> variance;  // [pixel] of the mean in `beauty`, estimated
