@@ -1,0 +1,28 @@
+#include "render/surface/surface_model.h"
+
+#include <fmt/format.h>
+
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace heddle {
+
+std::unique_ptr<const SurfaceModel> read_surface_model(const TomlTable& document) {
+  using Read = std::function<std::unique_ptr<const SurfaceModel>(const TomlTable&)>;
+  static const std::map<std::string, Read> readers = {
+  };
+  const std::string model = document.string("model");
+  const auto reader = readers.find(model);
+  if (reader == readers.end()) {
+    std::vector<std::string> known;
+    for (const auto& [name, read] : readers) known.push_back(name);
+    document.fail("model", fmt::format("expected one of {}", fmt::join(known, ", ")));
+  }
+  std::unique_ptr<const SurfaceModel> result = reader->second(document);
+  document.finish();
+  return result;
+}
+
+}  // namespace heddle
