@@ -513,6 +513,22 @@ std::array<double, 3> TomlTable::number3(std::string_view key, NumberRange range
   return document_->numbers<3>(*node_, key, range, fallback);
 }
 
+std::vector<double> TomlTable::numbers(std::string_view key, NumberRange range, std::size_t min_count,
+                                       std::size_t max_count) const {
+  const std::string expected =
+      fmt::format("an array of {} to {} numbers{}", min_count, max_count, with_range("", range_text(range)));
+  node_->record(key, "number[]", range_text(range), "required");
+  const toml::node* value = node_->find(key);
+  if (value == nullptr) document_->fail_missing(*node_, key, expected);
+  const toml::array* array = value->as_array();
+  if (array == nullptr || array->size() < min_count || array->size() > max_count) {
+    document_->fail_wrong_value(key, *value, expected);
+  }
+  std::vector<double> result;
+  for (const toml::node& element : *array) result.push_back(document_->checked_number(key, element, range));
+  return result;
+}
+
 std::filesystem::path TomlTable::existing_file(std::string_view key) const {
   node_->record(key, "file", "", "required");
   const toml::node* value = node_->find(key);

@@ -29,7 +29,8 @@ struct NumberRange {
 struct AskedKey {
   std::string
       path;  // dotted; arrays of tables as "light[].axis"; tables listed by table_names() as "fiber.NAME"
-  std::string type;           // number, integer, boolean, string, file, number[2], number[3], table, table[]
+  std::string type;           // number, integer, boolean, string, file, number[2], number[3], number[], table,
+                     // table[]
   std::string range;          // "" where none; strings with a fixed set of choices: "face | both"
   std::string default_value;  // "required" where there is none; "optional" for optional_* keys
 };
@@ -59,6 +60,9 @@ class TomlTable {
                                 std::optional<std::array<double, 2>> fallback = {}) const;
   std::array<double, 3> number3(std::string_view key, NumberRange range,
                                 std::optional<std::array<double, 3>> fallback = {}) const;
+  /// A required array of `min_count` to `max_count` numbers, each in the range.
+  std::vector<double> numbers(std::string_view key, NumberRange range, std::size_t min_count,
+                              std::size_t max_count) const;
   /// A string taken as a path relative to the folder of the document. The file must exist.
   std::filesystem::path existing_file(std::string_view key) const;
 

@@ -57,6 +57,16 @@ TEST(TomlTableTest, ReadsValuesOfEveryType) {
   EXPECT_NO_THROW(t.finish());
 }
 
+TEST(TomlTableTest, ReadsArraysOfAnyLengthInARange) {
+  const TomlTable t = parse("a = [1, 2.5, -3]\nb = []\nc = [1, 20]\n");
+  EXPECT_EQ(t.numbers("a", {-5, 5}, 1, 3), (std::vector<double>{1, 2.5, -3}));
+  EXPECT_TRUE(t.numbers("b", {}, 0, 4).empty());
+  EXPECT_THROW(t.numbers("a", {-5, 5}, 1, 2), ConfigError);
+  EXPECT_THROW(t.numbers("b", {}, 1, 4), ConfigError);
+  EXPECT_THROW(t.numbers("c", {0, 10}, 1, 4), ConfigError);
+  EXPECT_THROW(t.numbers("d", {}, 0, 4), ConfigError);
+}
+
 TEST(TomlTableTest, AbsentKeysGiveFallbacks) {
   const TomlTable t = parse("");
   EXPECT_EQ(t.integer("i", -5, 5, 2), 2);
