@@ -23,11 +23,18 @@ struct Quantity {
 };
 
 constexpr Quantity kQuantities[] = {
-    {"bcsdf", eval_bcsdf},           {"bcsdf_albedo", eval_bcsdf_albedo},
-    {"bcsdf_sh", eval_bcsdf_sh},     {"sg_mass", eval_sg_mass},
-    {"sg_product", eval_sg_product}, {"sg_scatter", eval_sg_scatter},
-    {"sg_zonal", eval_sg_zonal},     {"sh", eval_sh},
-    {"sh_rotate", eval_sh_rotate},   {"visibility", eval_visibility},
+    {"bcsdf", eval_bcsdf},
+    {"bcsdf_albedo", eval_bcsdf_albedo},
+    {"bcsdf_sh", eval_bcsdf_sh},
+    {"microcylinder", eval_microcylinder},
+    {"sg_mass", eval_sg_mass},
+    {"sg_product", eval_sg_product},
+    {"sg_scatter", eval_sg_scatter},
+    {"sg_zonal", eval_sg_zonal},
+    {"sh", eval_sh},
+    {"sh_rotate", eval_sh_rotate},
+    {"thread", eval_thread},
+    {"visibility", eval_visibility},
 };
 
 // The line is not a JSON object.
@@ -177,8 +184,7 @@ Json evaluate(const Json& request) {
     }
   }
   std::string known;
-  for (const Quantity& quantity : kQuantities)
-    known += (known.empty() ? "" : ", ") + std::string(quantity.name);
+  for (const Quantity& quantity : kQuantities) known += (known.empty() ? "" : ", ") + std::string(quantity.name);
   throw EvalError("field \"quantity\": unknown quantity \"" + name + "\"; known: " + known);
 }
 

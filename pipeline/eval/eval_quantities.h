@@ -23,6 +23,10 @@ nlohmann::json eval_sg_zonal(EvalObject& request);
 nlohmann::json eval_sh(EvalObject& request);
 nlohmann::json eval_sh_rotate(EvalObject& request);
 
+// eval_surface_microcylinder.cpp
+nlohmann::json eval_microcylinder(EvalObject& request);
+nlohmann::json eval_thread(EvalObject& request);
+
 // eval_visibility.cpp
 nlohmann::json eval_visibility(EvalObject& request);
 

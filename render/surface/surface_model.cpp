@@ -7,11 +7,15 @@
 #include <string>
 #include <vector>
 
+#include "render/surface/microcylinder.h"
+
 namespace heddle {
 
 std::unique_ptr<const SurfaceModel> read_surface_model(const TomlTable& document) {
   using Read = std::function<std::unique_ptr<const SurfaceModel>(const TomlTable&)>;
   static const std::map<std::string, Read> readers = {
+      {"microcylinder",
+       [](const TomlTable& config) { return std::make_unique<Microcylinder>(read_microcylinder_fabric(config)); }},
   };
   const std::string model = document.string("model");
   const auto reader = readers.find(model);

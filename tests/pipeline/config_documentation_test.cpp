@@ -15,6 +15,8 @@
 #include "precompute/visibility_settings.h"
 #include "precompute/voxelize.h"
 #include "render/scene_config.h"
+#include "render/surface/surface_model.h"
+#include "render/surface/surface_presets.h"
 
 namespace heddle {
 namespace {
@@ -82,6 +84,18 @@ TEST(ConfigDocumentation, NamesEveryKeyOfAFabric) {
     add(document, asked);
   }
   expect_equal(asked, documented("Fabrics"));
+}
+
+TEST(ConfigDocumentation, NamesEveryKeyOfASurfaceFabric) {
+  for (const auto& [model, section] : {std::pair{"microcylinder", "Microcylinder"}}) {
+    Keys asked;
+    for (const std::string& name : surface_preset_names(model)) {
+      const TomlTable document = surface_preset(name);
+      read_surface_model(document);
+      add(document, asked);
+    }
+    expect_equal(asked, documented(section));
+  }
 }
 
 TEST(ConfigDocumentation, NamesEveryKeyOfAScene) {
