@@ -377,7 +377,7 @@ Rgbd Microcylinder::reflected_sg(const SurfacePoint& point, const Vec3d& axis, d
     return std::sqrt(sharpness < 1e-9 ? 0.5 * depth : -std::expm1(-sharpness * depth) / whole);
   };
   CubatureSettings settings;
-  settings.tolerance = 1e-3;
+  settings.tolerance = 2e-3;
   // First cells of about 20 degrees or less, within three deviations of the light.
   const double reach = std::min(kPi, 3 / std::sqrt(std::max(sharpness, 1e-9)));
   settings.columns = std::clamp(static_cast<int>(std::ceil(reach / radians(20))), 2, 8);
