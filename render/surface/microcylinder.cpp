@@ -58,7 +58,9 @@ class Panels {
   Panels(double begin, double end) : begin_(begin), end_(end) { add(begin), add(end); }
 
   void add(double at) {
-    if (at >= begin_ && at <= end_ && count_ < kMost) ends_[count_++] = at;
+    if (!(at >= begin_ && at <= end_)) return;
+    assert(count_ < kMost && "four graded ends of seven steps each way, and a dozen others");
+    ends_[count_++] = at;
   }
 
   /// Ends about `centre` at distances reach, reach / 3, ... down to scale: what varies over a distance that shrinks

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdio>
 #include <functional>
+#include <tuple>
 
 #include "fibers/math/spherical_gaussian.h"
 #include "formats/input_error.h"
@@ -134,12 +135,17 @@ struct Peak {
   double height;
 };
 
-/// Local maxima of the mean over rgb with a prominence of 5 % of the largest; light = camera.
-std::vector<Peak> peaks_of(const Reflected& reflected, double diagonal_deg) {
+/// The light's direction where the camera is at wo: `up_deg` from it, towards the axis of the cylinder.
+Vec3d light_above(const Vec3d& wo, double diagonal_deg, double up_deg) {
+  return std::cos(radians(up_deg)) * wo + std::sin(radians(up_deg)) * turned(90, diagonal_deg + 90);
+}
+
+/// Local maxima of the mean over rgb with a prominence of 5 % of the largest.
+std::vector<Peak> peaks_of(const Reflected& reflected, double diagonal_deg, double up_deg = 0) {
   std::vector<double> values;
   for (double beta = -88; beta <= 88; beta += 0.5) {
     const Vec3d w = turned(beta, diagonal_deg);
-    values.push_back(reflected(w, w).mean());
+    values.push_back(reflected(light_above(w, diagonal_deg, up_deg), w).mean());
   }
   const double most = *std::max_element(values.begin(), values.end());
   std::vector<Peak> peaks;
@@ -208,6 +214,20 @@ TEST(Microcylinder, CylinderShowsThePublishedHighlights) {
   }
 }
 
+// What the paper measures on silk with the cylinder along thread 1; not with the light at the camera.
+TEST(Microcylinder, SilkShinesAtGrazingAnglesUnderLightFromAbove) {
+  const Reflected silk = of_fabric("silk-crepe-de-chine");
+  for (const auto& [up_deg, beta_deg, height] : {std::tuple{20., 67., .81}, std::tuple{30., 60., .96}}) {
+    const auto peaks = peaks_of(silk, kVertical, up_deg);
+    ASSERT_EQ(peaks.size(), 3u);
+    EXPECT_NEAR(peaks[1].beta_deg, 0, 1e-9);
+    for (const std::size_t edge : {std::size_t{0}, std::size_t{2}}) {
+      EXPECT_NEAR(std::abs(peaks[edge].beta_deg), beta_deg, .5);
+      EXPECT_NEAR(peaks[edge].height / peaks[1].height, height, .01);
+    }
+  }
+}
+
 TEST(Microcylinder, HighlightsDoNotDependOnWhatTheTextLeavesOpen) {
   for (const auto width : {ThreadConventions::Width::kStandardDeviation, ThreadConventions::Width::kIwasaki}) {
     for (const auto fresnel : {ThreadConventions::Fresnel::kHalf, ThreadConventions::Fresnel::kNormal}) {
@@ -228,9 +248,7 @@ TEST(Microcylinder, VelvetShinesToOneSide) {
     for (double beta = 0.5; beta <= 88; beta += 0.5) {
       for (const double sign : {-1.0, 1.0}) {
         const Vec3d wo = turned(sign * beta, diagonal_deg);
-        // Towards the light: `up_deg` along the axis of the cylinder.
-        const Vec3d axis = turned(90, diagonal_deg + 90);
-        const Vec3d wi = std::cos(radians(up_deg)) * wo + std::sin(radians(up_deg)) * axis;
+        const Vec3d wi = light_above(wo, diagonal_deg, up_deg);
         sides[sign > 0] += reflected(wi, wo).mean();
       }
     }
