@@ -23,6 +23,7 @@ enum class RandomStage : std::uint32_t {
   kBench = 9,
   kTest = 10,
   kOpenness = 11,
+  kWovenIrregularity = 12,
 };
 
 /// SplitMix64 finaliser: a bijection of 64-bit words whose output bits all depend on all input bits.
