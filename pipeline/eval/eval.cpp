@@ -35,6 +35,10 @@ constexpr Quantity kQuantities[] = {
     {"sh_rotate", eval_sh_rotate},
     {"thread", eval_thread},
     {"visibility", eval_visibility},
+    {"woven_area", eval_woven_area},
+    {"woven_brdf", eval_woven_brdf},
+    {"woven_btf", eval_woven_btf},
+    {"woven_yarns", eval_woven_yarns},
 };
 
 // The line is not a JSON object.

@@ -30,6 +30,12 @@ nlohmann::json eval_thread(EvalObject& request);
 // eval_visibility.cpp
 nlohmann::json eval_visibility(EvalObject& request);
 
+// eval_woven.cpp
+nlohmann::json eval_woven_area(EvalObject& request);
+nlohmann::json eval_woven_brdf(EvalObject& request);
+nlohmann::json eval_woven_btf(EvalObject& request);
+nlohmann::json eval_woven_yarns(EvalObject& request);
+
 }  // namespace heddle
 
 #endif  // HEDDLE_PIPELINE_EVAL_EVAL_QUANTITIES_H_

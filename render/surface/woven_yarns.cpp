@@ -247,8 +247,34 @@ WovenYarns::WovenYarns(WovenYarnsParameters parameters) : parameters_(std::move(
     const YarnMaterial& yarn = parameters_.yarns[s];
     // Fibers of staple yarns lean by the twist out of the spine's plane.
     inclination_range_[s] = std::min(yarn.max_inclination + std::abs(yarn.twist), radians(89.0));
-    coverage_[s] = parameters_.pattern.coverage(system);
+    highlight_scale_[s] = 1.0 / parameters_.pattern.coverage(system);
   }
+  if (parameters_.specular_is_albedo) {
+    const double albedo = highlight_albedo();
+    for (double& scale : highlight_scale_) scale = albedo > 0.0 ? scale / albedo : 0.0;
+  }
+}
+
+double WovenYarns::highlight_albedo() const {
+  // Pairs of cosine-distributed directions on a lattice of four dimensions (Roberts' generalised golden ratios).
+  constexpr int kPairs = 16384;
+  double sum = 0.0;
+  for (int n = 0; n < kPairs; ++n) {
+    const auto coordinate = [n](double step) { return std::fmod((n + 0.5) * step, 1.0); };
+    const auto direction = [](double a, double b) {
+      const double r = std::sqrt(a);
+      return Vec3d(r * std::cos(2.0 * kPi * b), r * std::sin(2.0 * kPi * b), std::sqrt(1.0 - a));
+    };
+    const Vec3d wi = direction(coordinate(0.8566748838545029), coordinate(0.7338918566271260));
+    const Vec3d wo = direction(coordinate(0.6287067210378087), coordinate(0.5385972572236101));
+    for (std::size_t k = 0; k < segments_.size(); ++k) {
+      const FloatKind& kind = parameters_.pattern.kinds()[k];
+      const Rectangle whole = to_segment(kind, {Vec2d::Zero(), kind.size});
+      sum += kind.share / whole.area() * highlight_scale_[static_cast<std::size_t>(kind.system)] *
+             yarn_highlight_integral(segments_[k], whole, to_segment(kind.system, wi), to_segment(kind.system, wo));
+    }
+  }
+  return kPi * sum / kPairs;
 }
 
 Rgbd WovenYarns::reflected(const SurfacePoint& point, const Vec3d& wi, const Vec3d& wo) const {
@@ -267,7 +293,7 @@ Rgbd WovenYarns::reflected(const SurfacePoint& point, const Vec3d& wi, const Vec
     const double highlight = seen.is_point ? yarn_highlight(segment, part.min, in, out)
                                            : yarn_highlight_integral(segment, part, in, out) / part.area();
     const YarnMaterial& yarn = parameters_.yarns[system];
-    sum += seen.share * wi.z() * (yarn.diffuse + yarn.specular * (highlight / coverage_[system]));
+    sum += seen.share * wi.z() * (yarn.diffuse / kPi + yarn.specular * (highlight * highlight_scale_[system]));
   });
   return sum;
 }
@@ -347,6 +373,7 @@ WovenYarnsParameters read_woven_yarns(const TomlTable& document) {
       .unit_mm = document.number("unit_mm", {.min = 0.001, .max = 100}),
       .pattern = read_woven_pattern(document.table("weave")),
       .yarns = {read_yarn("warp"), read_yarn("weft")},
+      .specular_is_albedo = document.boolean("specular_is_albedo", false),
   };
   return parameters;
 }

@@ -7,8 +7,8 @@
 // origin in the middle; on the cloth y = u l / (2 u_max), x = v w / pi. Fibers wind about the spine at the twist angle; twist 0
 // is a filament yarn, anything else a staple yarn. For two directions the fibers that mirror one into the other lie on a
 // curve: u(v) = const for filaments, v(u) for staples; the highlight is a band of constant width along it.
-// Lengths are in units of the config; the absolute scale goes with their square, as the mean over a segment is not divided
-// by its area: `specular` absorbs it.
+// Lengths are in units of the config. The absolute scale of the highlights goes with the square of the unit, as the mean over
+// a segment is not divided by its area: `specular` absorbs it, or the option specular_is_albedo replaces it.
 //
 // The paper is not at hand. What is here is derived from the geometry above and agrees with the terms that public
 // renderers document (Mitsuba 0.x plugin "irawan", LuxCore "cloth"); docs/surface-models.md says what is left out.
@@ -24,7 +24,7 @@ namespace heddle {
 
 /// What the segments of warp or weft are made of.
 struct YarnMaterial {
-  Rgbd diffuse = Rgbd::Zero();   // k_d: the BRDF of the diffuse part, as it is
+  Rgbd diffuse = Rgbd::Zero();   // k_d, the albedo of a Lambertian part
   Rgbd specular = Rgbd::Zero();  // k_s
   double uniform = 0.0;          // alpha: share of scattering that goes everywhere
   double forward = 0.0;          // beta: concentration of the forward scattering
@@ -61,6 +61,9 @@ struct WovenYarnsParameters {
   double unit_mm = 1.0;
   WovenPattern pattern;
   std::array<YarnMaterial, 2> yarns;  // [YarnSystem]
+  /// Scales the highlights so that with k_s = 1 everywhere they return all light that comes evenly from the whole upper side,
+  /// as LuxCore does: k_s up to 1 - k_d then keeps energy on that average (not for every single direction).
+  bool specular_is_albedo = false;
 };
 
 /// Each system's highlight is divided by its coverage, so that the far value is the sum of the two systems' means.
@@ -80,11 +83,12 @@ class WovenYarns : public SurfaceModel {
 
  private:
   double density(const Vec3d& wi, const Vec3d& wo) const;
+  double highlight_albedo() const;
 
   WovenYarnsParameters parameters_;
   std::vector<YarnSegment> segments_;       // [kind]
   std::array<double, 2> inclination_range_;  // [YarnSystem] of the half vectors that sample() draws
-  std::array<double, 2> coverage_;           // [YarnSystem]
+  std::array<double, 2> highlight_scale_;    // [YarnSystem]
 };
 
 WovenYarnsParameters read_woven_yarns(const TomlTable& document);

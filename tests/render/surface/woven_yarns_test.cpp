@@ -245,12 +245,16 @@ TEST(WovenYarnsStability, FiniteAndNotNegativeForRandomAndGrazingPairs) {
 TEST(WovenYarnsStatistical, SamplesFollowTheDensityAndWeighWhatTheyShould) {
   RandomStream random(5, RandomStage::kTest, 0, 0);
   constexpr int kTests = 2 * 3;
-  for (const char* name : {"irawan-denim", "irawan-charmeuse"}) {
-    const WovenYarns model(read_woven_yarns(surface_preset(name)));
+  const SurfacePoint points[] = {{Vec2(0.1F, 0.2F), 0.0F}, {Vec2(0.1F, 0.2F), 100.0F}};
+  for (int i = 0; i < 2; ++i) {
+    const char* const name = i == 0 ? "irawan-denim" : "irawan-charmeuse";
+    const SurfacePoint& point = points[i];
+    WovenYarnsParameters parameters = read_woven_yarns(surface_preset(name));
+    for (YarnMaterial& yarn : parameters.yarns) yarn.diffuse.setZero();
+    const WovenYarns model(std::move(parameters));
     for (const double theta_deg : {0.0, 45.0, 80.0}) {
       const double s = std::sin(radians(theta_deg));
       const Vec3 wo = Vec3d(0.6 * s, 0.8 * s, std::cos(radians(theta_deg))).cast<float>();
-      const SurfacePoint point = {Vec2(0.1F, 0.2F), 0};
       RunningMean albedo;
       EXPECT_TRUE(chi_square_accepts(
           std::string(name) + " " + std::to_string(static_cast<int>(theta_deg)),
@@ -265,6 +269,30 @@ TEST(WovenYarnsStatistical, SamplesFollowTheDensityAndWeighWhatTheyShould) {
       EXPECT_TRUE(means_agree("albedo", albedo.mean(), albedo.standard_error(), exact, 0.01 * exact, kTests));
     }
   }
+}
+
+TEST(WovenYarnsStatistical, SpecularAlbedoIsWhatThePresetSays) {
+  WovenYarnsParameters parameters = read_woven_yarns(surface_preset("irawan-charmeuse"));
+  ASSERT_TRUE(parameters.specular_is_albedo);
+  for (YarnMaterial& yarn : parameters.yarns) {
+    yarn.diffuse.setZero();
+    yarn.specular = Rgbd(0.3, 0.2, 0.1);
+  }
+  const WovenYarns model(std::move(parameters));
+  RandomStream random(6, RandomStage::kTest, 0, 0);
+  RunningMean albedo;
+  for (int n = 0; n < 100000; ++n) {
+    const auto direction = [&] {
+      const double z = std::sqrt(random.uniform_double());
+      const double phi = 2.0 * kPi * random.uniform_double();
+      const double r = std::sqrt(1.0 - z * z);
+      return Vec3d(r * std::cos(phi), r * std::sin(phi), z);
+    };
+    const Vec3d wi = direction();
+    albedo.add(kPi * model.reflected({Vec2(0, 0), 1000.0F}, wi, direction())[1] / wi.z());
+  }
+  // The lattice that sets the scale errs by less than 1 %.
+  EXPECT_TRUE(means_agree("specular albedo", albedo.mean(), albedo.standard_error(), 0.2, 0.002));
 }
 
 TEST(WovenYarns, SegmentsTooShortForTheirInclinationHaveNoHighlight) {
