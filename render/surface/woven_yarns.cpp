@@ -283,15 +283,25 @@ Rgbd WovenYarns::reflected(const SurfacePoint& point, const Vec3d& wi, const Vec
   if (!((wi + wo).norm() > kShortestSum)) return sum;
   const Vec2d position = point.position_mm.cast<double>() / parameters_.unit_mm;
   const double footprint = point.footprint_mm / parameters_.unit_mm;
+  std::vector<std::optional<double>> of_whole;  // [kind] the mean over a segment that is seen whole: the same for all of a kind
   parameters_.pattern.visit_footprint(position, footprint, [&](const FootprintPart& seen) {
     const FloatKind& kind = parameters_.pattern.kinds()[static_cast<std::size_t>(seen.kind)];
     const YarnSegment& segment = segments_[static_cast<std::size_t>(seen.kind)];
     const auto system = static_cast<std::size_t>(kind.system);
-    const Rectangle part = to_segment(kind, seen.part);
     const Vec3d in = to_segment(kind.system, wi);
     const Vec3d out = to_segment(kind.system, wo);
-    const double highlight = seen.is_point ? yarn_highlight(segment, part.min, in, out)
-                                           : yarn_highlight_integral(segment, part, in, out) / part.area();
+    const Rectangle part = to_segment(kind, seen.part);
+    double highlight = 0.0;
+    if (seen.is_point) {
+      highlight = yarn_highlight(segment, part.min, in, out);
+    } else if (part.area() < (1.0 - 1e-9) * kind.size.prod()) {
+      highlight = yarn_highlight_integral(segment, part, in, out) / part.area();
+    } else {
+      of_whole.resize(segments_.size());
+      std::optional<double>& known = of_whole[static_cast<std::size_t>(seen.kind)];
+      if (!known) known = yarn_highlight_integral(segment, part, in, out) / part.area();
+      highlight = *known;
+    }
     const YarnMaterial& yarn = parameters_.yarns[system];
     sum += seen.share * wi.z() * (yarn.diffuse / kPi + yarn.specular * (highlight * highlight_scale_[system]));
   });

@@ -179,6 +179,31 @@ TEST(WovenYarnsLaw, SegmentsAreReciprocal) {
   }
 }
 
+TEST(WovenYarnsLaw, WeftIsWarpTurned) {
+  // A plain weave of one yarn: turned by 90 degrees, its warp becomes its weft.
+  WovenYarnsParameters parameters = read_woven_yarns(surface_preset("irawan-linen-plain"));
+  for (YarnMaterial& yarn : parameters.yarns) yarn = kSegments[5].material;
+  for (YarnMaterial& yarn : parameters.yarns) yarn.specular.setOnes();
+  const WovenYarns model(std::move(parameters));
+  RandomStream random(7, RandomStage::kTest, 0, 0);
+  int lit = 0;
+  int differ = 0;
+  for (int n = 0; n < 2000; ++n) {
+    const auto turned = [](const Vec3d& w) { return Vec3d(-w.y(), w.x(), w.z()); };
+    const Vec3d wi = random_direction(random, 0.1);
+    const Vec3d wo = random_direction(random, 0.1);
+    const Vec2 at(random.uniform(), random.uniform());
+    const float footprint = n % 3 == 0 ? 0.0F : n % 3 == 1 ? 0.2F : 100.0F;
+    const double value = model.reflected({at, footprint}, wi, wo)[0];
+    const double other = model.reflected({Vec2(-at.y(), at.x()), footprint}, turned(wi), turned(wo))[0];
+    differ += std::abs(other - value) > 1e-5 * value ? 1 : 0;
+    lit += value > 0.0 ? 1 : 0;
+  }
+  EXPECT_GT(lit, 500);
+  // Rounding may move a step of the integrand over a node of its quadrature, or a point over the band's edge.
+  EXPECT_LT(differ, 5);
+}
+
 const char* const kPublicPresets[] = {"irawan-denim", "irawan-shantung",  "irawan-charmeuse",
                                       "irawan-twill", "irawan-gabardine", "irawan-polyester"};
 
@@ -293,6 +318,22 @@ TEST(WovenYarnsStatistical, SpecularAlbedoIsWhatThePresetSays) {
   }
   // The lattice that sets the scale errs by less than 1 %.
   EXPECT_TRUE(means_agree("specular albedo", albedo.mean(), albedo.standard_error(), 0.2, 0.002));
+}
+
+TEST(WovenYarns, FilamentsFadeOutBySmoothStep) {
+  const YarnSegment segment = {material(0, 40, 0.5, 0.4), 1, 3};
+  // Light and view along one direction at inclination u: all factors but the fading are the same past (1 - 0.4) u_max.
+  const auto value_at = [&](double share_of_fade) {
+    const double u = radians(40) * (0.6 + 0.4 * share_of_fade);
+    const Vec3d w(0, std::sin(u), std::cos(u));
+    return yarn_highlight(segment, {0, 0.5 * u * segment.length / radians(40) - 0.3}, w, w);
+  };
+  const double whole = value_at(1e-9);
+  EXPECT_GT(whole, 0.0);
+  EXPECT_NEAR(value_at(0.25) / whole, 1.0 - 0.15625, 1e-9);
+  EXPECT_NEAR(value_at(0.5) / whole, 0.5, 1e-9);
+  EXPECT_NEAR(value_at(0.999), 0.0, 1e-4 * whole);
+  EXPECT_EQ(value_at(1.001), 0.0);
 }
 
 TEST(WovenYarns, SegmentsTooShortForTheirInclinationHaveNoHighlight) {
