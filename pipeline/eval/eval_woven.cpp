@@ -1,7 +1,8 @@
-#include <cmath>
+#include <map>
+#include <memory>
+#include <string>
 #include <vector>
 
-#include "formats/input_error.h"
 #include "pipeline/eval/eval_quantities.h"
 #include "render/surface/surface_presets.h"
 #include "render/surface/woven_segment.h"
@@ -109,8 +110,14 @@ nlohmann::json eval_woven_yarns(EvalObject& request) {
     names += (names.empty() ? "" : ", ") + name;
   }
   if (!known) request.fail("fabric", "must be one of " + names);
-  const WovenYarns model(read_woven_yarns(surface_preset(fabric)));
-  if (!near) point.footprint_mm = static_cast<float>(1000.0 * model.parameters().unit_mm * model.parameters().pattern.repeat().sum());
+  // Built once per fabric: its scale takes an integral over pairs of directions.
+  static std::map<std::string, std::unique_ptr<const WovenYarns>> models;
+  std::unique_ptr<const WovenYarns>& built = models[fabric];
+  if (!built) built = std::make_unique<const WovenYarns>(read_woven_yarns(surface_preset(fabric)));
+  const WovenYarns& model = *built;
+  if (!near)
+    point.footprint_mm =
+        static_cast<float>(1000.0 * model.parameters().unit_mm * model.parameters().pattern.repeat().sum());
   const Rgbd value = model.reflected(point, wi, wo);
   return {value[0], value[1], value[2]};
 }

@@ -1,9 +1,12 @@
 # Builds the surface fabrics of configs/fabrics (the files with a key `model`) into ${surface_preset_data}.
 file(GLOB configs CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/configs/fabrics/*.toml)
+# By name: with the ending, "a-b.toml" would come before "a.toml".
+list(TRANSFORM configs REPLACE "\\.toml$" "")
 list(SORT configs)
 set(entries "")
 set(count 0)
-foreach(config ${configs})
+foreach(stem ${configs})
+  set(config ${stem}.toml)
   set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${config})
   file(READ ${config} text)
   if(text MATCHES "(^|\n)model = \"([a-z0-9-]+)\"")

@@ -59,12 +59,13 @@ const WovenSegment& WovenCotton::segment_of(const PlacedFloat& placed) const {
   if (variants_ == 1) return segments_[kind];
   const bool warp = placed.segment->system == YarnSystem::kWarp;
   const bool per_yarn = parameters_.irregularity->per_yarn;
-  const auto item = static_cast<std::uint64_t>(
-      per_yarn ? placed.segment->yarn + (warp ? 0 : 64) : placed.segment - parameters_.pattern.floats().data());
+  const auto item = static_cast<std::uint64_t>(per_yarn ? placed.segment->yarn + (warp ? 0 : 64)
+                                                        : placed.segment - parameters_.pattern.floats().data());
   // Along its yarn a segment's address is its repeat; of a yarn as a whole it has none.
   const std::int64_t x = per_yarn && !warp ? 0 : placed.repeat_x;
   const std::int64_t y = per_yarn && warp ? 0 : placed.repeat_y;
-  const std::uint64_t repeat = mix64(static_cast<std::uint64_t>(x)) + 0x9e3779b97f4a7c15ULL * static_cast<std::uint64_t>(y);
+  const std::uint64_t repeat =
+      mix64(static_cast<std::uint64_t>(x)) + 0x9e3779b97f4a7c15ULL * static_cast<std::uint64_t>(y);
   RandomStream random(parameters_.irregularity->seed, RandomStage::kWovenIrregularity, item + 1024, repeat);
   return segments_[kind * static_cast<std::size_t>(kVariants) + random.index(kVariants)];
 }
@@ -136,7 +137,8 @@ float WovenCotton::pdf(const SurfacePoint& /*point*/, const Vec3& wi, const Vec3
   return static_cast<float>(density(wi.cast<double>(), wo.cast<double>()));
 }
 
-std::optional<SurfaceSample> WovenCotton::sample(const SurfacePoint& point, const Vec3& wo, RandomStream& random) const {
+std::optional<SurfaceSample> WovenCotton::sample(const SurfacePoint& point, const Vec3& wo,
+                                                 RandomStream& random) const {
   const Vec3d out = wo.cast<double>();
   Vec3d wi;
   double choice = random.uniform_double();
@@ -166,7 +168,6 @@ std::optional<SurfaceSample> WovenCotton::sample(const SurfacePoint& point, cons
 }
 
 WovenCottonParameters read_woven_cotton(const TomlTable& document) {
-  document.string("name");
   const auto read_yarn = [&](const char* section) {
     const TomlTable table = document.table(section);
     const auto color = [&](const char* key, double max) {

@@ -11,7 +11,9 @@
 namespace heddle {
 namespace {
 
-int wrapped(int index, int count) { return ((index % count) + count) % count; }
+int wrapped(int index, int count) {
+  return ((index % count) + count) % count;
+}
 
 std::vector<double> edges_of(const std::vector<double>& widths) {
   std::vector<double> edges = {0.0};
@@ -39,7 +41,8 @@ Weave parse_matrix(const std::string& text) {
   weave.picks = static_cast<int>(rows.size());
   for (auto row = rows.rbegin(); row != rows.rend(); ++row) {
     if (row->size() != rows[0].size() || row->find_first_not_of("01") != std::string::npos) {
-      throw std::invalid_argument("expected rows of equal length of 0 (weft on top) and 1 (warp on top), such as \"10 01\"");
+      throw std::invalid_argument(
+          "expected rows of equal length of 0 (weft on top) and 1 (warp on top), such as \"10 01\"");
     }
     for (const char crossing : *row) weave.warp_up.push_back(crossing == '1' ? 1 : 0);
   }
@@ -125,8 +128,8 @@ PlacedFloat WovenPattern::locate(const Vec2d& position) const {
   const Vec2d repeat(std::floor(position.x() / repeat_.x()), std::floor(position.y() / repeat_.y()));
   const Vec2d inside = position - repeat.cwiseProduct(repeat_);
   const auto ends = x_.size() - 1;
-  const auto at = static_cast<std::size_t>(interval(y_, inside.y())) * ends +
-                  static_cast<std::size_t>(interval(x_, inside.x()));
+  const auto at =
+      static_cast<std::size_t>(interval(y_, inside.y())) * ends + static_cast<std::size_t>(interval(x_, inside.x()));
   const WovenFloat& segment = floats_[static_cast<std::size_t>(float_at_[at])];
   PlacedFloat placed;
   placed.segment = &segment;
@@ -148,7 +151,8 @@ void WovenPattern::visit(const Rectangle& rectangle,
       const Vec2d origin(static_cast<double>(i) * repeat_.x(), static_cast<double>(j) * repeat_.y());
       for (const WovenFloat& segment : floats_) {
         const Vec2d corner = origin + segment.corner;
-        const Rectangle clip = {(rectangle.min - corner).cwiseMax(0.0), (rectangle.max - corner).cwiseMin(segment.size)};
+        const Rectangle clip = {(rectangle.min - corner).cwiseMax(0.0),
+                                (rectangle.max - corner).cwiseMin(segment.size)};
         if ((clip.min.array() >= clip.max.array()).any()) continue;
         visitor({&segment, i, j, corner}, clip);
       }

@@ -25,7 +25,7 @@ struct WovenFloat {
   Vec2d corner;  // lower left, inside the repeat; the segment may reach beyond it
   Vec2d size;
   int kind = 0;  // index into kinds()
-  int yarn;  // end or pick
+  int yarn;      // end or pick
 };
 
 /// Segments of one system and size look alike.
@@ -67,7 +67,8 @@ class WovenPattern {
   PlacedFloat locate(const Vec2d& position) const;
 
   /// Every segment that shares area with the rectangle, in a fixed order, with that area in the frame of the segment.
-  void visit(const Rectangle& rectangle, const std::function<void(const PlacedFloat&, const Rectangle&)>& visitor) const;
+  void visit(const Rectangle& rectangle,
+             const std::function<void(const PlacedFloat&, const Rectangle&)>& visitor) const;
 
   /// What a footprint sees: the axis-parallel square about the position whose side is the footprint. Below kPointFootprint it
   /// is a point; from one to two repeats (the longer side of the repeat) it blends into the cloth as a whole, which it is from
@@ -79,9 +80,9 @@ class WovenPattern {
 
  private:
   Vec2d repeat_;
-  Vec2d largest_;  // sides of the largest segment
-  std::vector<double> x_;  // [end + 1] left edges
-  std::vector<double> y_;  // [pick + 1] lower edges
+  Vec2d largest_;              // sides of the largest segment
+  std::vector<double> x_;      // [end + 1] left edges
+  std::vector<double> y_;      // [pick + 1] lower edges
   std::vector<int> float_at_;  // [pick][end]
   std::vector<WovenFloat> floats_;
   std::vector<FloatKind> kinds_;

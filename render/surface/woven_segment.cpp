@@ -9,10 +9,14 @@
 namespace heddle {
 namespace {
 
-double cross(const Vec2d& a, const Vec2d& b) { return a.x() * b.y() - a.y() * b.x(); }
+double cross(const Vec2d& a, const Vec2d& b) {
+  return a.x() * b.y() - a.y() * b.x();
+}
 
 // Signed area of the unit disc's sector between two directions.
-double sector(const Vec2d& p, const Vec2d& q) { return 0.5 * std::atan2(cross(p, q), p.dot(q)); }
+double sector(const Vec2d& p, const Vec2d& q) {
+  return 0.5 * std::atan2(cross(p, q), p.dot(q));
+}
 
 // Signed area of the unit disc inside the triangle (0, p, q).
 double disc_in_triangle(const Vec2d& p, const Vec2d& q) {
@@ -52,7 +56,8 @@ Vec2d highlight_centre(const WovenSegment& segment, const Vec2d& half) {
 }
 
 bool is_in_highlight(const WovenSegment& segment, const Vec2d& point, const Vec2d& half) {
-  const Vec2d focus = segment.semimajor * segment.eccentricity * Vec2d(std::cos(segment.angle), std::sin(segment.angle));
+  const Vec2d focus =
+      segment.semimajor * segment.eccentricity * Vec2d(std::cos(segment.angle), std::sin(segment.angle));
   const Vec2d from_centre = point - highlight_centre(segment, half);
   return (from_centre - focus).norm() + (from_centre + focus).norm() <= 2.0 * segment.semimajor;
 }

@@ -118,9 +118,9 @@ std::optional<StapleHighlight> staple_highlight(const YarnSegment& segment, doub
   const double geometry = a * (radius + a * std::cos(*v)) / ((cos_i + cos_o) * std::abs(std::sin(material.twist)));
   const double band = material.highlight_width * segment.width;
   const double limit = 0.5 * (segment.width - band);
-  return StapleHighlight{std::clamp(*v * segment.width / kPi, -limit, limit),
-                         geometry * attenuation(cos_i, cos_o) * phase_value * 2.0 * material.max_inclination /
-                             material.highlight_width};
+  return StapleHighlight{
+      std::clamp(*v * segment.width / kPi, -limit, limit),
+      geometry * attenuation(cos_i, cos_o) * phase_value * 2.0 * material.max_inclination / material.highlight_width};
 }
 
 double overlap(double low, double high, double centre, double width) {
@@ -130,8 +130,8 @@ double overlap(double low, double high, double centre, double width) {
 double filament_integral(const YarnSegment& segment, const Rectangle& part, const Vec3d& wi, const Vec3d& wo) {
   const std::optional<FilamentHighlight> highlight = filament_highlight(segment, wi, wo);
   if (!highlight) return 0.0;
-  const double height = overlap(part.min.y(), part.max.y(), highlight->centre,
-                                segment.material.highlight_width * segment.length);
+  const double height =
+      overlap(part.min.y(), part.max.y(), highlight->centre, segment.material.highlight_width * segment.length);
   if (height <= 0.0) return 0.0;
   // n . w is proportional to cos(v - v_w): positive within pi/2 of v_w.
   double low = std::max(-0.5 * kPi, part.min.x() * kPi / segment.width);
@@ -165,7 +165,7 @@ double staple_integral(const YarnSegment& segment, const Rectangle& part, const 
   };
   const auto is_lit = [&](double u) { return staple_highlight(segment, u, wi, wo, phase_value).has_value(); };
 
-  constexpr int kPanels = 16;   // over the whole segment
+  constexpr int kPanels = 16;  // over the whole segment
   constexpr int kBisections = 20;
   const int panels = std::max(2, static_cast<int>(std::ceil(kPanels * (high - low) / (2.0 * u_max))));
   const QuadratureRule& rule = gauss_legendre(3);
@@ -198,7 +198,9 @@ double staple_integral(const YarnSegment& segment, const Rectangle& part, const 
 
 }  // namespace
 
-bool YarnSegment::has_spine() const { return width * std::sin(material.max_inclination) < length; }
+bool YarnSegment::has_spine() const {
+  return width * std::sin(material.max_inclination) < length;
+}
 
 double spine_radius(const YarnSegment& segment, double u, double u_max) {
   const double reach = 0.5 * (segment.length - segment.width * std::sin(u_max));
@@ -233,7 +235,8 @@ double yarn_highlight(const YarnSegment& segment, const Vec2d& point, const Vec3
 
 double yarn_highlight_integral(const YarnSegment& segment, const Rectangle& part, const Vec3d& wi, const Vec3d& wo) {
   if (!segment.has_spine()) return 0.0;
-  return segment.material.twist == 0.0 ? filament_integral(segment, part, wi, wo) : staple_integral(segment, part, wi, wo);
+  return segment.material.twist == 0.0 ? filament_integral(segment, part, wi, wo)
+                                       : staple_integral(segment, part, wi, wo);
 }
 
 WovenYarns::WovenYarns(WovenYarnsParameters parameters) : parameters_(std::move(parameters)) {
@@ -283,7 +286,8 @@ Rgbd WovenYarns::reflected(const SurfacePoint& point, const Vec3d& wi, const Vec
   if (!((wi + wo).norm() > kShortestSum)) return sum;
   const Vec2d position = point.position_mm.cast<double>() / parameters_.unit_mm;
   const double footprint = point.footprint_mm / parameters_.unit_mm;
-  std::vector<std::optional<double>> of_whole;  // [kind] the mean over a segment that is seen whole: the same for all of a kind
+  std::vector<std::optional<double>>
+      of_whole;  // [kind] the mean over a segment that is seen whole: the same for all of a kind
   parameters_.pattern.visit_footprint(position, footprint, [&](const FootprintPart& seen) {
     const FloatKind& kind = parameters_.pattern.kinds()[static_cast<std::size_t>(seen.kind)];
     const YarnSegment& segment = segments_[static_cast<std::size_t>(seen.kind)];
@@ -345,7 +349,8 @@ std::optional<SurfaceSample> WovenYarns::sample(const SurfacePoint& point, const
     const double azimuth = 2.0 * kPi * b;
     wi = Vec3d(std::sqrt(a) * std::cos(azimuth), std::sqrt(a) * std::sin(azimuth), std::sqrt(1.0 - a));
   } else {
-    const YarnSystem system = choice < kCosineShare + 0.5 * (1.0 - kCosineShare) ? YarnSystem::kWarp : YarnSystem::kWeft;
+    const YarnSystem system =
+        choice < kCosineShare + 0.5 * (1.0 - kCosineShare) ? YarnSystem::kWarp : YarnSystem::kWeft;
     const double inclination = inclination_range_[static_cast<std::size_t>(system)] * (2.0 * a - 1.0);
     const double x = 2.0 * b - 1.0;
     const double rest = std::sqrt(1.0 - x * x);
@@ -360,7 +365,6 @@ std::optional<SurfaceSample> WovenYarns::sample(const SurfacePoint& point, const
 }
 
 WovenYarnsParameters read_woven_yarns(const TomlTable& document) {
-  document.string("name");
   const auto read_yarn = [&](const char* section) {
     const TomlTable table = document.table(section);
     const auto color = [&](const char* key, double max) {

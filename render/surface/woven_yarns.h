@@ -86,7 +86,7 @@ class WovenYarns : public SurfaceModel {
   double highlight_albedo() const;
 
   WovenYarnsParameters parameters_;
-  std::vector<YarnSegment> segments_;       // [kind]
+  std::vector<YarnSegment> segments_;        // [kind]
   std::array<double, 2> inclination_range_;  // [YarnSystem] of the half vectors that sample() draws
   std::array<double, 2> highlight_scale_;    // [YarnSystem]
 };

@@ -26,7 +26,9 @@ double value_of(const Json& request) {
   return result.value("value", std::nan(""));
 }
 
-std::string error_of(const Json& request) { return answer(request).value("error", ""); }
+std::string error_of(const Json& request) {
+  return answer(request).value("error", "");
+}
 
 // A disc of radius 1/2 in a square window of side 2; half = (1, 0) takes its centre to the right edge, (1, 1) to the corner.
 const Json kDisc = {{"size", {2, 2}}, {"alpha", 0.5}, {"eccentricity", 0}, {"phi_deg", 30}, {"k", {1, 1}}};
@@ -44,7 +46,8 @@ TEST(EvalWoven, AreaOfADisc) {
 }
 
 Json pair_request(const char* quantity) {
-  return {{"quantity", quantity}, {"wi", {0, 0, 1}}, {"wo", {0, 0, 1}}, {"diffuse", 0.1}, {"specular", 2}, {"ior", 1.5}};
+  return {{"quantity", quantity}, {"wi", {0, 0, 1}}, {"wo", {0, 0, 1}},
+          {"diffuse", 0.1},       {"specular", 2},   {"ior", 1.5}};
 }
 
 TEST(EvalWoven, BtfInAndBesideTheHighlight) {
@@ -76,7 +79,8 @@ TEST(EvalWoven, BrdfWeighsSegmentsByArea) {
 }
 
 TEST(EvalWoven, YarnsFarIsTheMeanOfNear) {
-  Json request = {{"quantity", "woven_yarns"}, {"fabric", "irawan-polyester"}, {"wi", {0, 0.6, 0.8}}, {"wo", {0, -0.48, 0.8773}}};
+  Json request = {
+      {"quantity", "woven_yarns"}, {"fabric", "irawan-polyester"}, {"wi", {0, 0.6, 0.8}}, {"wo", {0, -0.48, 0.8773}}};
   const Json far = answer(request)["value"];
   double sum = 0;
   constexpr int kGrid = 60;
@@ -113,7 +117,8 @@ TEST(EvalWoven, ErrorsNameTheField) {
   request["point"] = {0, 0};
   request["ior"] = 0.5;
   EXPECT_NE(error_of(request).find("\"ior\""), std::string::npos);
-  EXPECT_NE(error_of({{"quantity", "woven_yarns"}, {"fabric", "tweed"}, {"wi", {0, 0, 1}}, {"wo", {0, 0, 1}}}).find("irawan-denim"),
+  EXPECT_NE(error_of({{"quantity", "woven_yarns"}, {"fabric", "tweed"}, {"wi", {0, 0, 1}}, {"wo", {0, 0, 1}}})
+                .find("irawan-denim"),
             std::string::npos);
 }
 

@@ -46,9 +46,8 @@ TEST(SgLightQuadratureAgreement, ConvergesAgainstBruteForceSmoothAndStep) {
       const double exact = brute_force(axis, sharpness, f, 1500);
       std::printf("  sharpness %g, %s:", sharpness, is_step ? "step" : "smooth");
       for (const int points : {1597, 10946, 75025, 514229}) {
-        const double value =
-            integrate_sg_light(axis, sharpness, [&](const Vec3d& w) { return Rgbd::Constant(f(w)); },
-                               {.tolerance = 0.0, .max_points = points})[0];
+        const double value = integrate_sg_light(axis, sharpness, [&](const Vec3d& w) { return Rgbd::Constant(f(w)); },
+                                                {.tolerance = 0.0, .max_points = points})[0];
         const double error = std::abs(value / exact - 1.0);
         std::printf(" %.1e", error);
         // The step fills a tenth of the hemisphere and more, so relative errors are up to ten times the rates; 2e-4 is the

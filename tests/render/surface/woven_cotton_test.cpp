@@ -18,9 +18,9 @@ namespace {
 
 std::string config(const std::string& more = "", double diffuse = 0.05) {
   const std::string colors = "diffuse = [" + std::to_string(diffuse) + ", 0.02, 0]\nspecular = [0.5, 0.7, 0.9]\n";
-  return "name = \"test\"\nmodel = \"woven-cotton\"\nunit_mm = 0.25\n[weave]\nnotation = \"twill 3/1\"\nend_widths = [1]\n"
-         "pick_widths = [2]\n[warp]\n" + colors +
-         "semimajor = 3\neccentricity = 0.995\nangle_deg = 95\nk = [1.5, 3.1]\n[weft]\n" + colors +
+  return "model = \"woven-cotton\"\nunit_mm = 0.25\n[weave]\nnotation = \"twill 3/1\"\nend_widths = [1]\n"
+         "pick_widths = [2]\n[warp]\n" +
+         colors + "semimajor = 3\neccentricity = 0.995\nangle_deg = 95\nk = [1.5, 3.1]\n[weft]\n" + colors +
          "semimajor = 1\neccentricity = 0.9\nangle_deg = 80\nk = [3.7, 1.6]\n" + more;
 }
 
@@ -41,8 +41,8 @@ Vec3d random_direction(RandomStream& random, double min_z = 0.0) {
 const SurfacePoint kFar = {Vec2(0.3F, 0.1F), 1000.0F};
 
 /// Mean of the values at a grid of points over `size` mm, each seen with the footprint.
-Rgbd mean_over(const WovenCotton& model, const Vec2d& low, const Vec2d& size, int grid, float footprint, const Vec3d& wi,
-               const Vec3d& wo) {
+Rgbd mean_over(const WovenCotton& model, const Vec2d& low, const Vec2d& size, int grid, float footprint,
+               const Vec3d& wi, const Vec3d& wo) {
   Rgbd sum = Rgbd::Zero();
   for (int i = 0; i < grid; ++i) {
     for (int j = 0; j < grid; ++j) {
@@ -95,7 +95,8 @@ TEST(WovenCottonAgreement, FootprintIsTheMeanOverItsSquare) {
       const Vec3d wo = random_direction(random, 0.7);
       const Vec2d at(10.0 * random.uniform_double(), 10.0 * random.uniform_double());
       const Rgbd value = model.reflected({at.cast<float>(), static_cast<float>(footprint)}, wi, wo);
-      const Rgbd mean = mean_over(model, at - Vec2d::Constant(0.5 * footprint), Vec2d::Constant(footprint), 700, 0.0F, wi, wo);
+      const Rgbd mean =
+          mean_over(model, at - Vec2d::Constant(0.5 * footprint), Vec2d::Constant(footprint), 700, 0.0F, wi, wo);
       const double height = highlight_reflectance(wi, wo, 1.5) * 0.9;
       EXPECT_LT((value - mean).abs().maxCoeff(), 2e-3 * height) << footprint;
     }
@@ -267,8 +268,9 @@ TEST(WovenCottonStatistical, SamplesFollowTheDensityAndWeighWhatTheyShould) {
   for (const char* more : weaves) {
     const WovenCotton model = model_of(config(more));
     for (const double theta_deg : {0.0, 45.0, 80.0}) {
-      const Vec3 wo = Vec3d(std::sin(radians(theta_deg)) * 0.6, std::sin(radians(theta_deg)) * 0.8, std::cos(radians(theta_deg)))
-                          .cast<float>();
+      const Vec3 wo =
+          Vec3d(std::sin(radians(theta_deg)) * 0.6, std::sin(radians(theta_deg)) * 0.8, std::cos(radians(theta_deg)))
+              .cast<float>();
       const SurfacePoint point = {Vec2(0.1F, 0.2F), 0.3F};
       RunningMean albedo;
       EXPECT_TRUE(chi_square_accepts(
@@ -305,8 +307,8 @@ TEST(WovenCotton, ConfigErrorsHaveTheirPlace) {
     return "";
   };
   EXPECT_EQ(message(config(), "unit_mm", "unit_mm"), "");
-  EXPECT_NE(message(config(), "semimajor = 3", "semimajor = 0").find("test.toml:11:"), std::string::npos);
-  EXPECT_NE(message(config(), "eccentricity = 0.995", "eccentricity = 1").find("test.toml:12:"), std::string::npos);
+  EXPECT_NE(message(config(), "semimajor = 3", "semimajor = 0").find("test.toml:10:"), std::string::npos);
+  EXPECT_NE(message(config(), "eccentricity = 0.995", "eccentricity = 1").find("test.toml:11:"), std::string::npos);
   EXPECT_NE(message(config(), "unit_mm", "units_mm").find("unit_mm"), std::string::npos);
   EXPECT_NE(message(config("[irregularity]\nsize = 0.6\n"), "0.6", "0.6").find("size"), std::string::npos);
 }

@@ -11,7 +11,9 @@
 namespace heddle {
 namespace {
 
-WovenPattern pattern_of(const std::string& keys) { return read_woven_pattern(TomlTable::parse(keys, "test.toml")); }
+WovenPattern pattern_of(const std::string& keys) {
+  return read_woven_pattern(TomlTable::parse(keys, "test.toml"));
+}
 
 const char* const kPatterns[] = {
     "notation = \"plain\"\nend_widths = [1]\npick_widths = [1]",
@@ -103,7 +105,8 @@ TEST(WovenPattern, BadWeavesAreErrorsWithTheirPlace) {
   EXPECT_NE(message("matrix = \"\"" + widths).find("1 to 64 rows"), std::string::npos);
   EXPECT_NE(message("matrix = \"10 10\"" + widths).find("go under"), std::string::npos);
   EXPECT_NE(message("matrix = \"11 00\"" + widths).find("go under"), std::string::npos);
-  EXPECT_NE(message("notation = \"plain\"\nend_widths = [1, 2, 3]\npick_widths = [1]").find("divides"), std::string::npos);
+  EXPECT_NE(message("notation = \"plain\"\nend_widths = [1, 2, 3]\npick_widths = [1]").find("divides"),
+            std::string::npos);
 }
 
 }  // namespace

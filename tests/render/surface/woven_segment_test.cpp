@@ -15,8 +15,12 @@ namespace heddle {
 namespace {
 
 // The segments of the paper's twill.
-WovenSegment twill_warp() { return {{1, 6}, 3, 0.995, radians(95), {1.5, 3.1}}; }
-WovenSegment twill_weft() { return {{1, 2}, 1, 0.9, radians(80), {3.7, 1.6}}; }
+WovenSegment twill_warp() {
+  return {{1, 6}, 3, 0.995, radians(95), {1.5, 3.1}};
+}
+WovenSegment twill_weft() {
+  return {{1, 2}, 1, 0.9, radians(80), {3.7, 1.6}};
+}
 
 WovenSegment random_segment(RandomStream& random) {
   WovenSegment segment;
@@ -34,7 +38,9 @@ Vec2d random_half(RandomStream& random) {
   return {radius * std::cos(angle), radius * std::sin(angle)};
 }
 
-bool fits(const WovenSegment& segment) { return (segment.half_extent().array() <= 0.5 * segment.size.array()).all(); }
+bool fits(const WovenSegment& segment) {
+  return (segment.half_extent().array() <= 0.5 * segment.size.array()).all();
+}
 
 /// The paper's way: which of the five cases of its figure 9, and the share of the window. Case 0: none of them.
 struct FiveCases {
@@ -122,7 +128,8 @@ TEST(WovenSegmentAgreement, FiveCasesWhereTheEllipseFits) {
     ASSERT_NE(expected.which, 0);
     worst = std::max(worst, std::abs(highlight_share(segment, half) - expected.share));
   }
-  std::printf("  cases 1-5: %d %d %d %d %d, worst difference %.2g\n", seen[1], seen[2], seen[3], seen[4], seen[5], worst);
+  std::printf("  cases 1-5: %d %d %d %d %d, worst difference %.2g\n", seen[1], seen[2], seen[3], seen[4], seen[5],
+              worst);
   for (int which = 1; which <= 5; ++which) EXPECT_GT(seen[which], 50) << which;
   // Rounding of crossings near a tangent grows as the square root: sqrt(2.2e-16) in position, its cube in area.
   EXPECT_LT(worst, 1e-12);
@@ -140,7 +147,8 @@ double area_by_columns(const WovenSegment& segment, const Vec2d& half, const Rec
   const double qxy = c * s * (1.0 / a2 - 1.0 / b2);
   const double qyy = s * s / a2 + c * c / b2;
   const double half_width = segment.half_extent().x();
-  std::vector<double> breaks = {-half_width, half_width, rectangle.min.x() - centre.x(), rectangle.max.x() - centre.x()};
+  std::vector<double> breaks = {-half_width, half_width, rectangle.min.x() - centre.x(),
+                                rectangle.max.x() - centre.x()};
   for (const double edge : {rectangle.min.y() - centre.y(), rectangle.max.y() - centre.y()}) {
     const double root = qxy * qxy * edge * edge - qxx * (qyy * edge * edge - 1.0);
     if (root > 0.0) {
@@ -302,7 +310,8 @@ TEST(WovenSegmentLaw, DirectionalAlbedoOfTheTwill) {
     double most = 0.0;
     for (const double azimuth_deg : {0.0, 45.0, 75.0, 135.0}) {
       const double s = std::sin(radians(row.angle_deg));
-      const Vec3d wo(s * std::cos(radians(azimuth_deg)), s * std::sin(radians(azimuth_deg)), std::cos(radians(row.angle_deg)));
+      const Vec3d wo(s * std::cos(radians(azimuth_deg)), s * std::sin(radians(azimuth_deg)),
+                     std::cos(radians(row.angle_deg)));
       constexpr int kRows = 400;
       constexpr int kColumns = 600;
       double sum = 0.0;

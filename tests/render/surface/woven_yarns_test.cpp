@@ -28,8 +28,8 @@ YarnMaterial material(double psi_deg, double umax_deg, double kappa, double smoo
 }
 
 const YarnSegment kSegments[] = {
-    {material(0, 40, 0), 1, 3},     {material(0, 50, -0.9), 2, 4},  {material(0, 25, 2.0, 0.4), 1, 2},
-    {material(-30, 24, 0), 1, 6},   {material(30, 36, -0.5), 2, 4}, {material(20, 45, 1.0), 1, 1},
+    {material(0, 40, 0), 1, 3},   {material(0, 50, -0.9), 2, 4},  {material(0, 25, 2.0, 0.4), 1, 2},
+    {material(-30, 24, 0), 1, 6}, {material(30, 36, -0.5), 2, 4}, {material(20, 45, 1.0), 1, 1},
 };
 
 Vec3d random_direction(RandomStream& random, double min_z = 0.0) {
@@ -44,9 +44,9 @@ TEST(WovenYarnsLaw, SpineSpansItsSegment) {
     for (const double umax_deg : {5.0, 30.0, 45.0, 80.0}) {
       const YarnSegment segment = {material(0, umax_deg, kappa), 1, 3};
       const double u_max = radians(umax_deg);
-      const QuadratureRule rule = gauss_legendre_panels(20, 0.0, u_max, {0.5 * u_max, 0.9 * u_max, 0.97 * u_max, 0.99 * u_max});
-      const double span =
-          integrate(rule, [&](double u) { return spine_radius(segment, u, u_max) * std::cos(u); });
+      const QuadratureRule rule =
+          gauss_legendre_panels(20, 0.0, u_max, {0.5 * u_max, 0.9 * u_max, 0.97 * u_max, 0.99 * u_max});
+      const double span = integrate(rule, [&](double u) { return spine_radius(segment, u, u_max) * std::cos(u); });
       EXPECT_NEAR(span, 0.5 * (3.0 - std::sin(u_max)), 1e-6) << kappa << " " << umax_deg;
     }
   }
@@ -72,7 +72,8 @@ TEST(WovenYarns, SpineIsTheConicThatKappaNames) {
   const double bh = reach / std::sinh(std::atanh(0.5));
   const double th = std::atanh(0.5 * std::tan(0.3));
   EXPECT_NEAR(spine_radius(hyperbola, 0.3, u_max),
-              std::pow(std::pow(bh * std::cosh(th), 2) + std::pow(2.0 * bh * std::sinh(th), 2), 1.5) / (2.0 * bh * bh), 1e-12);
+              std::pow(std::pow(bh * std::cosh(th), 2) + std::pow(2.0 * bh * std::sinh(th), 2), 1.5) / (2.0 * bh * bh),
+              1e-12);
 }
 
 /// Integral over the tube of (fiber tangent . (wi + wo) within a narrow Gaussian) * area element * phase * attenuation: the
@@ -81,8 +82,8 @@ double tube_integral(const YarnSegment& segment, const Vec3d& wi, const Vec3d& w
   const YarnMaterial& yarn = segment.material;
   const Vec3d sum = wi + wo;
   const double a = 0.5 * segment.width;
-  const double phase = yarn.uniform + std::exp(-yarn.forward * (wi.dot(wo) + 1.0)) /
-                                          (2.0 * kPi * scaled_bessel_i0(yarn.forward));
+  const double phase =
+      yarn.uniform + std::exp(-yarn.forward * (wi.dot(wo) + 1.0)) / (2.0 * kPi * scaled_bessel_i0(yarn.forward));
   constexpr double kDeviation = 0.01;
   double total = 0.0;
   for (int i = 0; i < steps; ++i) {
@@ -212,7 +213,8 @@ TEST(WovenYarns, PublicPresetsHaveTheirPublishedAreas) {
   const double weft[] = {1, 16, 1, 2, 6, 1};
   for (std::size_t i = 0; i < std::size(kPublicPresets); ++i) {
     const WovenYarnsParameters parameters = read_woven_yarns(surface_preset(kPublicPresets[i]));
-    EXPECT_NEAR(parameters.pattern.coverage(YarnSystem::kWarp), warp[i] / (warp[i] + weft[i]), 1e-12) << kPublicPresets[i];
+    EXPECT_NEAR(parameters.pattern.coverage(YarnSystem::kWarp), warp[i] / (warp[i] + weft[i]), 1e-12)
+        << kPublicPresets[i];
   }
   const WovenYarnsParameters charmeuse = read_woven_yarns(surface_preset("irawan-charmeuse"));
   ASSERT_EQ(charmeuse.pattern.kinds().size(), 2U);
@@ -257,7 +259,9 @@ TEST(WovenYarnsStability, FiniteAndNotNegativeForRandomAndGrazingPairs) {
       };
       const Vec3d wo = direction();
       const Vec3d wi = n % 8 == 5 ? Vec3d(-wo.x(), -wo.y(), wo.z()) : direction();
-      const SurfacePoint point = {Vec2(random.uniform(), random.uniform()), n % 3 == 0 ? 0.0F : n % 3 == 1 ? 100.0F : 0.1F};
+      const SurfacePoint point = {Vec2(random.uniform(), random.uniform()), n % 3 == 0   ? 0.0F
+                                                                            : n % 3 == 1 ? 100.0F
+                                                                                         : 0.1F};
       const Rgbd value = model->reflected(point, wi, wo);
       bad += value.isFinite().all() && value.minCoeff() >= 0.0 ? 0 : 1;
       const float density = model->pdf(point, wi.cast<float>(), wo.cast<float>());
@@ -348,7 +352,7 @@ TEST(WovenYarns, SegmentsTooShortForTheirInclinationHaveNoHighlight) {
 
 TEST(WovenYarns, ConfigErrorsHaveTheirPlace) {
   const std::string text =
-      "name = \"x\"\nmodel = \"irawan-2012\"\nunit_mm = 1\n[weave]\nnotation = \"plain\"\nend_widths = [1]\n"
+      "model = \"irawan-2012\"\nunit_mm = 1\n[weave]\nnotation = \"plain\"\nend_widths = [1]\n"
       "pick_widths = [1]\n";
   const std::string yarn =
       "diffuse = [0, 0, 0]\nspecular = [1, 1, 1]\nalpha = 0\nbeta = 10\npsi_deg = 0\numax_deg = 90\nkappa = -0.99\n";
@@ -356,7 +360,7 @@ TEST(WovenYarns, ConfigErrorsHaveTheirPlace) {
     read_surface_model(TomlTable::parse(text + "[warp]\n" + yarn + "[weft]\n" + yarn, "velvet.toml"));
     FAIL() << "accepted";
   } catch (const ConfigError& error) {
-    EXPECT_NE(std::string(error.what()).find("velvet.toml:14:"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("velvet.toml:13:"), std::string::npos) << error.what();
   }
 }
 
