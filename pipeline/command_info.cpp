@@ -136,11 +136,10 @@ Report describe_pack(const fs::path& folder) {
   report["bytes_per_segment"] =
       rounded(static_cast<double>(segment_bytes) / static_cast<double>(pack.exemplar.segment_count()));
   if (pack.transfer) {
-    const auto& cells = pack.transfer->grid.cells;
     report["transfer_order"] = pack.transfer->order;
-    report["cells"] = fmt::format("{} x {} x {}", cells[0], cells[1], cells[2]);
+    report["cells"] = pack.transfer->cell_count();
     report["bytes_per_cell"] = rounded(static_cast<double>(manifest.files.at("transfer.safetensors").bytes) /
-                                       static_cast<double>(pack.transfer->grid.count()));
+                                       static_cast<double>(pack.transfer->cell_count()));
   }
   return report;
 }

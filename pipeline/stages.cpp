@@ -258,7 +258,7 @@ void FabricStages::run_shard(const Stage& stage, Work&& work) {
 // Maps do not depend on [visibility], which says how they are compressed.
 FabricStages::Stage FabricStages::maps_stage() {
   return make_stage(
-      "maps", 1, ".safetensors", "",
+      "maps", 2, ".safetensors", "",
       {{"geometry", geometry_key()}, {"light_from", light_from()}, {"seed", fmt::format("{}", document_.config.seed)}});
 }
 
@@ -331,7 +331,7 @@ TransferSettings FabricStages::transfer_settings(std::optional<int> order) const
 }
 
 FabricStages::Stage FabricStages::transfer_stage(const TransferSettings& settings) {
-  return make_stage("transfer", 1, ".safetensors", document_.transfer_text,
+  return make_stage("transfer", 2, ".safetensors", document_.transfer_text,
                     {{"fibers", synth().key},
                      {"order", fmt::format("{}", settings.order)},
                      {"light_from", light_from()},
@@ -342,6 +342,7 @@ FabricStages::Stage FabricStages::transfer_stage(const TransferSettings& setting
 struct FabricStages::TransferWork {
   std::vector<BcsdfTable> materials;
   TransferSettings settings;
+  SegmentCells cells;
   std::optional<TransferBaker> baker;
 
   void compute(const fs::path& file, std::uint32_t first, std::uint32_t end) const {
@@ -354,10 +355,9 @@ std::unique_ptr<FabricStages::TransferWork> FabricStages::transfer_work(const Tr
   for (const FiberScattering& scattering : exemplar().scattering) work->materials.emplace_back(scattering);
   work->settings = settings;
   const double mean_free_path = scene().mean_free_path(settings.seed, kMeanFreePathSamples);
-  const Exemplar& cloth = exemplar();
-  const CellGrid grid = make_cell_grid(cloth.width_mm, cloth.height_mm, cloth.z_min, cloth.z_max,
-                                       static_cast<float>(settings.cell_mean_free_paths * mean_free_path));
-  work->baker.emplace(scene(), work->materials, origins(), settings, grid);
+  work->cells = make_segment_cells(exemplar(), origins(),
+                                   static_cast<float>(settings.cell_mean_free_paths * mean_free_path));
+  work->baker.emplace(scene(), work->materials, origins(), settings, work->cells);
   return work;
 }
 
@@ -411,7 +411,7 @@ Artifact FabricStages::pack(const Needs& needs) {
         write_file_atomically(folder / file, read_whole_file(artifact.path));
         manifest.files[file] = {};
       }
-      if (needs.transfer) manifest.counts["cells"] = read_transfer(folder / "transfer.safetensors").grid.count();
+      if (needs.transfer) manifest.counts["cells"] = read_transfer(folder / "transfer.safetensors").cell_count();
       write_manifest(folder, std::move(manifest));
     });
   });

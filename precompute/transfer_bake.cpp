@@ -39,10 +39,15 @@ TransferSettings read_transfer_settings(const TomlTable& section) {
 }
 
 TransferBaker::TransferBaker(const TileScene& scene, std::span<const BcsdfTable> materials,
-                             const SegmentOrigins& origins, const TransferSettings& settings, const CellGrid& grid)
-    : scene_(&scene), materials_(materials), origins_(&origins), settings_(settings), grid_(grid), cells_(grid.count()) {
+                             const SegmentOrigins& origins, const TransferSettings& settings, const SegmentCells& cells)
+    : scene_(&scene),
+      materials_(materials),
+      origins_(&origins),
+      settings_(settings),
+      segment_cells_(&cells),
+      cells_(cells.count) {
   for (std::uint32_t s = 0; s < scene.exemplar().segment_count(); ++s) {
-    CellSegments& cell = cells_[grid_.cell_of(scene.exemplar().segment_midpoint(s))];
+    CellSegments& cell = cells_[cells.cell_of_segment[s]];
     const double before = cell.segment.empty() ? 0.0 : cell.cumulative_openness.back();
     cell.segment.push_back(s);
     cell.cumulative_openness.push_back(before + origins.openness[s] + kLeastOpenness);
@@ -51,8 +56,6 @@ TransferBaker::TransferBaker(const TileScene& scene, std::span<const BcsdfTable>
 
 void TransferBaker::bake_cell(std::uint32_t cell, float* matrix, float* standard_error, std::uint32_t* paths) const {
   const auto& [segments, cumulative_openness] = cells_[cell];
-  *paths = 0;
-  if (segments.empty()) return;
   const int n = (settings_.order + 1) * (settings_.order + 1);
   const TileTrace trace(*scene_);
   const WalkLimits limits;
@@ -118,7 +121,7 @@ void TransferBaker::bake_cell(std::uint32_t cell, float* matrix, float* standard
 }
 
 TransferChunk TransferBaker::bake(std::uint32_t first_cell, std::uint32_t last_cell) const {
-  assert(first_cell <= last_cell && last_cell <= grid_.count());
+  assert(first_cell <= last_cell && last_cell <= cell_count());
   const std::size_t n = static_cast<std::size_t>((settings_.order + 1) * (settings_.order + 1));
   const std::size_t matrix = n * n * 3;
   const std::size_t bands = static_cast<std::size_t>(settings_.order + 1) * 3;
@@ -138,7 +141,7 @@ TransferChunk TransferBaker::bake(std::uint32_t first_cell, std::uint32_t last_c
 Transfer TransferBaker::assemble(std::span<const TransferChunk> chunks) const {
   Transfer transfer;
   transfer.order = settings_.order;
-  transfer.grid = grid_;
+  transfer.cell_of_segment = segment_cells_->cell_of_segment;
   transfer.both_sides = settings_.both_sides;
   for (const TransferChunk& chunk : chunks) {
     assert(chunk.first_cell == transfer.paths.size());
@@ -147,7 +150,7 @@ Transfer TransferBaker::assemble(std::span<const TransferChunk> chunks) const {
                                    chunk.standard_error.end());
     transfer.paths.insert(transfer.paths.end(), chunk.paths.begin(), chunk.paths.end());
   }
-  assert(transfer.paths.size() == grid_.count());
+  assert(transfer.paths.size() == cell_count());
   return transfer;
 }
 

@@ -23,12 +23,13 @@
 #include "fibers/tracing/segment_origins.h"
 #include "fibers/tracing/tile_scene.h"
 #include "formats/toml_table.h"
+#include "precompute/segment_cells.h"
 
 namespace heddle {
 
 struct TransferSettings {
   int order = 5;                    // SH bands 0 .. order, light and incoming alike
-  double cell_mean_free_paths = 1;  // edge of a cell in mean free paths
+  double cell_mean_free_paths = 1;  // as many cells as cubes of this edge, in mean free paths
   int min_paths = 0;                // per cell, rounded up to whole batches
   int max_paths = 0;
   double target_error = 0;          // rms standard error of the matrix' entries relative to a[0][0], brightest colour
@@ -53,16 +54,16 @@ class TransferBaker {
  public:
   static constexpr int kBatch = 1024;  // paths per batch
 
-  /// The scene, the tables and the origins must outlive the baker.
+  /// All that is passed by reference must outlive the baker.
   TransferBaker(const TileScene& scene, std::span<const BcsdfTable> materials, const SegmentOrigins& origins,
-                const TransferSettings& settings, const CellGrid& grid);
+                const TransferSettings& settings, const SegmentCells& cells);
 
   /// Cells first .. last - 1, in parallel.
   TransferChunk bake(std::uint32_t first_cell, std::uint32_t last_cell) const;
   /// All chunks, in order of their cells, as one artifact.
   Transfer assemble(std::span<const TransferChunk> chunks) const;
 
-  std::uint32_t cell_count() const { return grid_.count(); }
+  std::uint32_t cell_count() const { return static_cast<std::uint32_t>(cells_.size()); }
 
  private:
   void bake_cell(std::uint32_t cell, float* matrix, float* standard_error, std::uint32_t* paths) const;
@@ -71,9 +72,9 @@ class TransferBaker {
   std::span<const BcsdfTable> materials_;
   const SegmentOrigins* origins_;
   TransferSettings settings_;
-  CellGrid grid_;
+  const SegmentCells* segment_cells_;
   struct CellSegments {
-    std::vector<std::uint32_t> segment;       // whose midpoint lies in the cell
+    std::vector<std::uint32_t> segment;
     std::vector<double> cumulative_openness;  // running sum
   };
   std::vector<CellSegments> cells_;  // [cell]

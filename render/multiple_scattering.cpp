@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include "fibers/math/hemisphere_dual.h"
 #include "fibers/math/sampling.h"
 #include "fibers/math/sh_rotation.h"
 #include "fibers/math/special_functions.h"
@@ -64,30 +65,35 @@ MultipleScattering::LightShape::LightShape(std::optional<float> sharpness) : dir
       }
     }
     for (int l = 0; l <= kMaxShOrder; ++l) {
-      for (int m = (l + 1) % 2; m <= l; m += 2) {
+      for (int m = 0; m <= l; ++m) {
         const int j = l * (l + 1) + m;
         upper_[static_cast<std::size_t>(row * kCount + j)] =
-            static_cast<float>(2 * sum[static_cast<std::size_t>(j)] / (kPolar * kAzimuths));
+            static_cast<float>(sum[static_cast<std::size_t>(j)] / (kPolar * kAzimuths));
       }
     }
   }
 }
 
 void MultipleScattering::LightShape::project(int order, bool both_sides, const Vec3& axis, float* coefficients) const {
-  if (both_sides || directional_) {
-    if (!both_sides && !(axis.z() > 0)) {
-      std::fill_n(coefficients, sh_count(order), 0.0F);
-      return;
-    }
+  if (both_sides) {
     evaluate_sh(order, axis, coefficients);
     for (int l = 0; l <= order; ++l) {
-      for (int m = -l; m <= l; ++m) {
-        const float parity = (l + m) % 2 == 0 ? 0.0F : 2.0F;
-        coefficients[l * (l + 1) + m] *= both_sides ? band_[static_cast<std::size_t>(l)] : parity;
-      }
+      for (int m = -l; m <= l; ++m) coefficients[l * (l + 1) + m] *= band_[static_cast<std::size_t>(l)];
     }
     return;
   }
+  if (!directional_) {
+    moments_above(order, axis, coefficients);
+  } else if (axis.z() > 0) {
+    evaluate_sh(order, axis, coefficients);
+  } else {
+    std::fill_n(coefficients, sh_count(order), 0.0F);
+    return;
+  }
+  HemisphereDual::of_order(order).apply(coefficients);
+}
+
+void MultipleScattering::LightShape::moments_above(int order, const Vec3& axis, float* moments) const {
   const float place = std::acos(std::clamp(axis.z(), -1.0F, 1.0F)) * (kInclinations - 1) / kPif;
   const int row = std::min(static_cast<int>(place), kInclinations - 2);
   const float share = place - static_cast<float>(row);
@@ -103,8 +109,8 @@ void MultipleScattering::LightShape::project(int order, bool both_sides, const V
     for (int l = m; l <= order; ++l) {
       const int j = l * (l + 1);
       const float value = low[j + m] + share * (high[j + m] - low[j + m]);
-      coefficients[j + m] = value * c;
-      if (m > 0) coefficients[j - m] = value * s;
+      moments[j + m] = value * c;
+      if (m > 0) moments[j - m] = value * s;
     }
     const float next = c * c1 - s * s1;
     s = s * c1 + c * s1;

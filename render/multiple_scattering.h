@@ -10,12 +10,11 @@
 //
 // A truncated expansion rings: an incoming field, and with it the outgoing radiance, can be slightly negative. Signs are
 // kept, so that sums over samples have the expansion's mean; who shows a picture may clamp it.
-// Under light from the face only, the transfer is 0 for light from below, and falls to 0 about linearly as light nears the
-// horizon, where it no longer gets in between the fibers. An expansion of a function with such a bend loses light near it
-// (flat gabardine, light at 70 degrees: 13 % too dark). So the transfer is continued oddly, T(x, y, -z) = -T(x, y, z), which
-// has no bend and needs no other data: its odd coefficients (l + m odd) are twice the stored ones, its even ones 0.
-// Light is projected over the upper hemisphere only, where both agree: c_light[j] = 2 [l + m odd] integral over z > 0 of
-// L Y_j. Measured on gabardine: truncation alone 3.6 instead of 6.8 % (an even continuation makes it worse).
+// Under light from the face only, the transfer is known, and asked for, above the horizon only: its stored coefficients are
+// moments over the upper hemisphere, and light is projected onto their dual (fibers/math/hemisphere_dual.h):
+// c_light = G^+ integral over z > 0 of L Y_j. Taking the coefficients for those of a function that is 0 below the horizon, as
+// printed, loses light near it (flat gabardine, light at 70 degrees: 13 % too dark); an odd continuation below it is better,
+// the dual better still (docs/performance.md).
 // Tested in tests/render/multiple_scattering_test.cpp.
 
 #include <array>
@@ -41,7 +40,7 @@ class MultipleScattering {
       : transfer_(&transfer), materials_(materials) {}
 
   /// A light's shape, computed once for all samples: band factors A_l for light from both sides, and for light from the
-  /// face a table of the projection over the upper hemisphere by the inclination of the axis. Without a sharpness:
+  /// face a table of the moments over the upper hemisphere by the inclination of the axis. Without a sharpness:
   /// directional.
   class LightShape {
    public:
@@ -54,9 +53,12 @@ class MultipleScattering {
     // Rows of upper_, for axis inclinations from +z in equal steps; between them, linear interpolation (error below 2e-3 of
     // the largest coefficient, as its test measures).
     static constexpr int kInclinations = 129;
+    /// Integrals over z > 0 of the normalised Gaussian about `axis` times Y_j: [sh_count(order)].
+    void moments_above(int order, const Vec3& axis, float* moments) const;
+
     bool directional_;
     std::array<float, kMaxShOrder + 1> band_;  // [l]
-    std::vector<float> upper_;  // [inclination][j] of a light whose axis lies in the xz plane; m < 0 and even l + m are 0
+    std::vector<float> upper_;  // [inclination][j] of a light whose axis lies in the xz plane; m < 0 are 0
   };
 
   /// Field at `cell` under a light about `axis` (unit, fabric space).

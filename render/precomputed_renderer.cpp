@@ -142,7 +142,7 @@ void PrecomputedRenderer::shade(const Camera& camera, const PixelRect& block, in
     const FabricPack& pack = *cloths_[hit->cloth].pack;
     const Vec3 wo = -ray.direction;
     points.push_back({hit->segment,
-                      pack.cell_of_segment[hit->segment],
+                      pack.transfer->cell_of_segment[hit->segment],
                       pack.exemplar.segment_material(hit->segment),
                       {scene_->world_tangent(*hit), pack.exemplar.segment_tangent(hit->segment)},
                       {wo, scene_->fabric_direction(*hit, wo)}});

@@ -152,10 +152,7 @@ FabricPack load_pack(const std::filesystem::path& folder) {
   }
   if (manifest.files.contains("transfer.safetensors")) {
     pack.transfer = read_transfer(folder / "transfer.safetensors");
-    pack.cell_of_segment.reserve(segments);
-    for (std::uint32_t s = 0; s < segments; ++s) {
-      pack.cell_of_segment.push_back(pack.transfer->grid.cell_of(pack.exemplar.segment_midpoint(s)));
-    }
+    require_rows(pack.transfer->cell_of_segment.size(), "transfer.safetensors");
   }
   if (manifest.files.contains("volume.vdb")) {
     pack.volume = read_id_volume(folder / "volume.vdb");

@@ -52,7 +52,6 @@ struct FabricPack {
   std::optional<Transfer> transfer;
   std::optional<IdVolume> volume;
   std::vector<BcsdfTable> materials;           // [material]
-  std::vector<std::uint32_t> cell_of_segment;  // [segment]; empty where there is no transfer
 };
 
 /// Hashes the files named in `manifest.files` inside `folder` (their sizes and checksums are filled in) and writes

@@ -24,36 +24,20 @@ void write_transfer(const std::filesystem::path& path, const Transfer& t,
   for (const auto& [key, value] : metadata) file.set_metadata(key, value);
   file.set_metadata("kind", "transfer");
   file.set_metadata("light_from", t.both_sides ? "both" : "face");
-  const std::vector<std::int32_t> cells(t.grid.cells.begin(), t.grid.cells.end());
-  const std::vector<float> box = {t.grid.width_mm, t.grid.height_mm, t.grid.z_min, t.grid.z_max};
-  file.add<std::int32_t>("cells", {3}, cells);
-  file.add<float>("grid_mm", {4}, box);
-  file.add<float>("matrices", {t.grid.count(), n, n, 3}, t.matrices);
-  file.add<float>("standard_error", {t.grid.count(), bands, 3}, t.standard_error);
-  file.add<std::uint32_t>("paths", {t.grid.count()}, t.paths);
+  file.add<std::uint32_t>("cell_of_segment", {t.cell_of_segment.size()}, t.cell_of_segment);
+  file.add<float>("matrices", {t.cell_count(), n, n, 3}, t.matrices);
+  file.add<float>("standard_error", {t.cell_count(), bands, 3}, t.standard_error);
+  file.add<std::uint32_t>("paths", {t.cell_count()}, t.paths);
   file.write(path);
 }
 
 Transfer read_transfer(const std::filesystem::path& path) {
   const TensorFile file = TensorFile::read(path);
   Transfer t;
-  const auto cells = file.get<std::int32_t>("cells", {3});
-  const auto box = file.get<float>("grid_mm", {4});
-  for (int axis = 0; axis < 3; ++axis) {
-    if (cells[static_cast<std::size_t>(axis)] < 1 || cells[static_cast<std::size_t>(axis)] > 4096) {
-      throw FileError(fmt::format("{}: expected 1 to 4096 cells along each axis", path.string()));
-    }
-    t.grid.cells[static_cast<std::size_t>(axis)] = cells[static_cast<std::size_t>(axis)];
-  }
-  t.grid.width_mm = box[0];
-  t.grid.height_mm = box[1];
-  t.grid.z_min = box[2];
-  t.grid.z_max = box[3];
-  if (!(box[0] > 0 && box[1] > 0 && box[3] > box[2])) throw FileError(path.string() + ": the cell grid has no volume");
   const std::string& sides = file.metadata_value("light_from");
   if (sides != "face" && sides != "both") throw FileError(path.string() + ": light_from is neither face nor both");
   t.both_sides = sides == "both";
-  const std::uint64_t count = t.grid.count();
+  const std::uint64_t count = file.shape("paths").at(0);
   const std::vector<std::uint64_t>& error_shape = file.shape("standard_error");
   if (error_shape.size() != 3 || error_shape[1] < 1 || error_shape[1] > 11) {
     throw FileError(path.string() + ": expected standard_error of shape [cell][band][3] with 1 to 11 bands");
@@ -63,6 +47,10 @@ Transfer read_transfer(const std::filesystem::path& path) {
   t.matrices = file.get<float>("matrices", {count, n, n, 3});
   t.standard_error = file.get<float>("standard_error", {count, error_shape[1], 3});
   t.paths = file.get<std::uint32_t>("paths", {count});
+  t.cell_of_segment = file.get<std::uint32_t>("cell_of_segment", {file.shape("cell_of_segment").at(0)});
+  for (const std::uint32_t cell : t.cell_of_segment) {
+    if (cell >= count) throw FileError(fmt::format("{}: cell {} of {}", path.string(), cell, count));
+  }
   return t;
 }
 

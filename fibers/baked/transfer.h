@@ -11,19 +11,19 @@
 #include <string>
 #include <vector>
 
-#include "fibers/baked/cell_grid.h"
 #include "fibers/math/vector.h"
 
 namespace heddle {
 
 struct Transfer {
   int order = 5;  // highest SH band; (order + 1)^2 coefficients
-  CellGrid grid;
   bool both_sides = false;            // light from the whole sphere; otherwise only from the face side (z > 0)
+  std::vector<std::uint32_t> cell_of_segment;  // [segment]; every cell has a segment
   std::vector<float> matrices;        // [cell][j0][j1][rgb]
   std::vector<float> standard_error;  // [cell][band of j1][rgb]: rms over the entries of the band
-  std::vector<std::uint32_t> paths;   // [cell] paths spent; 0 for a cell without segments
+  std::vector<std::uint32_t> paths;   // [cell] paths spent
 
+  std::uint32_t cell_count() const { return static_cast<std::uint32_t>(paths.size()); }
   int coefficients() const { return (order + 1) * (order + 1); }
 
   /// c_T = a^T c_light for one cell: light [j0] -> incoming [j1][rgb].

@@ -53,7 +53,7 @@ SegmentOrigins find_segment_origins(const TileScene& scene, bool both_sides, Ori
     origins.openness[i] = possible > 0 ? seen / possible : 0;
     origins.position[i] = exemplar.segment_midpoint(segment);
     const Vec3 across = exposed - exposed.dot(frame.col(0)) * frame.col(0);
-    if (choice == OriginChoice::kExposed && across.norm() > 0) origins.position[i] += radius * across.normalized();
+    if (choice == OriginChoice::kExposed && across.norm() > 0) origins.position[i] += kExposedDepth * radius * across.normalized();
   });
   return origins;
 }

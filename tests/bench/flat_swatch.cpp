@@ -176,7 +176,7 @@ class Swatch {
   void add_precomputed(std::uint32_t segment, const Vec3& tangent, const Vec3& wo, double scale,
                        std::array<Values, 2>& parts) const {
     const ShadingPoint point = {segment,
-                                pack_.cell_of_segment[segment],
+                                pack_.transfer->cell_of_segment[segment],
                                 pack_.exemplar.segment_material(segment),
                                 {tangent, tangent},
                                 {wo, wo}};
@@ -294,7 +294,7 @@ void print_report(const FabricPack& pack, const Options& options, const std::arr
   }));
   const double total = compare(halves, kReference, kTotal, -1).reference;
   fmt::print("{}: {} segments, SH order {}, {} cells; {} views x {} lights, {} eye rays per view\n",
-             pack.name, pack.exemplar.segment_count(), pack.transfer->order, pack.transfer->grid.count(),
+             pack.name, pack.exemplar.segment_count(), pack.transfer->order, pack.transfer->cell_count(),
              kViews, kLights, options.paths);
   fmt::print("mean reference radiance {:.5f}; its standard error, rms over values: {:.2f} %\n\n", total,
              100 * noise / total);

@@ -185,10 +185,10 @@ void transfer_cost(const TileScene& tile, const SegmentOrigins& origins, const F
   settings.both_sides = fabric.config.light_from_both_sides;
   const auto edge = static_cast<float>(settings.cell_mean_free_paths * tile.mean_free_path(1, kMeanFreePathSamples));
   const Exemplar& exemplar = tile.exemplar();
-  const CellGrid grid = make_cell_grid(exemplar.width_mm, exemplar.height_mm, exemplar.z_min, exemplar.z_max, edge);
-  const TransferBaker baker(tile, materials, origins, settings, grid);
-  const std::uint32_t first = grid.count() / 2;
-  const std::uint32_t last = std::min(first + 40, grid.count());
+  const SegmentCells cells = make_segment_cells(exemplar, origins, edge);
+  const TransferBaker baker(tile, materials, origins, settings, cells);
+  const std::uint32_t first = cells.count / 2;
+  const std::uint32_t last = std::min(first + 40, cells.count);
   TransferChunk chunk;
   const double seconds = timed([&] { chunk = baker.bake(first, last); });
   double paths = 0;
@@ -212,9 +212,9 @@ void transfer_cost(const TileScene& tile, const SegmentOrigins& origins, const F
   const double per_path = queries / kPaths;
   const double matrix_bytes = 4.0 * 3 * std::pow(settings.order + 1, 4);
   fmt::print("transfer: {:.0f} paths per core-second at order {}, {:.1f} rays per path: {:.2f} million rays/s, {:.0f} % of raw "
-             "intersection; {} cells of {:.0f} um, {:.0f} bytes per matrix\n",
+             "intersection; {} cells, as many as cubes of {:.0f} um, {:.0f} bytes per matrix\n",
              paths / seconds, settings.order, per_path, per_path * paths / seconds / 1e6,
-             100 * per_path * paths / seconds / rates.raw_intersection, grid.count(), 1e3 * edge, matrix_bytes);
+             100 * per_path * paths / seconds / rates.raw_intersection, cells.count, 1e3 * edge, matrix_bytes);
 }
 
 const std::vector<float>& channel(const Image& image, const std::string& name) {

@@ -69,15 +69,16 @@ void compare_estimators(const std::string& path) {
   std::vector<BcsdfTable> materials;
   for (const FiberScattering& fiber : exemplar.scattering) materials.emplace_back(fiber);
   const auto edge = static_cast<float>(scene.mean_free_path(1, 20000));
-  const CellGrid grid = make_cell_grid(exemplar.width_mm, exemplar.height_mm, exemplar.z_min, exemplar.z_max, edge);
+  const SegmentOrigins origins = find_segment_origins(scene, false, OriginChoice::kMidpoint, 1);
+  const SegmentCells cells = make_segment_cells(exemplar, origins, edge);
   const TileTrace trace(scene);
   double ratio_sum = 0;
   for (int k = 0; k < kCells; ++k) {
     RandomStream pick(1, RandomStage::kBench, 1, static_cast<std::uint64_t>(k));
-    const std::uint32_t cell = grid.cell_of(exemplar.segment_midpoint(pick.index(exemplar.segment_count())));
+    const std::uint32_t cell = cells.cell_of_segment[pick.index(exemplar.segment_count())];
     std::vector<std::uint32_t> segments;
     for (std::uint32_t s = 0; s < exemplar.segment_count(); ++s) {
-      if (grid.cell_of(exemplar.segment_midpoint(s)) == cell) segments.push_back(s);
+      if (cells.cell_of_segment[s] == cell) segments.push_back(s);
     }
     const Merit printed = measure([&](int batch) {
       Matrix sum = Matrix::Zero(kCoefficients, 3 * kCoefficients);

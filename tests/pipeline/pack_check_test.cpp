@@ -29,13 +29,11 @@ FabricPack sound_pack() {
                           .sees_nothing = std::vector<std::uint8_t>(segments)};
   Transfer transfer;
   transfer.order = 0;
-  transfer.grid =
-      make_cell_grid(pack.exemplar.width_mm, pack.exemplar.height_mm, pack.exemplar.z_min, pack.exemplar.z_max, 10);
+  transfer.cell_of_segment.assign(segments, 0);
   transfer.matrices = {0.1F, 0.1F, 0.1F};
   transfer.standard_error = {0, 0, 0};
   transfer.paths = {1024};
   pack.transfer = transfer;
-  pack.cell_of_segment.assign(segments, 0);
   IdVolume volume;
   volume.size = {2, 1, 1};
   volume.voxel_mm = {pack.exemplar.width_mm / 2, pack.exemplar.height_mm, 1};
@@ -55,7 +53,11 @@ TEST(PackCheck, EveryNumberedCheckCanFail) {
       {"fibers.safetensors: check 6", [](FabricPack& p) { p.exemplar.scattering[0].beta_tt = 0; }},
       {"ssdf.safetensors: check 8", [](FabricPack& p) { p.ssdf->mean[2] = 4; }},
       {"sg.safetensors: check 9", [](FabricPack& p) { p.sgs->weights[0] = half_from_float(13); }},
-      {"transfer.safetensors: check 10", [](FabricPack& p) { p.transfer->grid.width_mm *= 2; }},
+      {"transfer.safetensors: check 10", [](FabricPack& p) {
+         p.transfer->matrices.resize(6);
+         p.transfer->standard_error.resize(6);
+         p.transfer->paths.push_back(1024);
+       }},
       {"transfer.safetensors: check 10", [](FabricPack& p) { p.transfer->both_sides = true; }},
       {"transfer.safetensors: check 10", [](FabricPack& p) { p.transfer->standard_error[1] = -1; }},
       {"transfer.safetensors: check 10", [](FabricPack& p) { p.transfer->paths[0] = 0; }},

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "fibers/math/hemisphere_dual.h"
 #include "fibers/math/quadrature.h"
 #include "fibers/math/random.h"
 #include "fibers/math/sampling.h"
@@ -163,9 +164,7 @@ TEST(MultipleScatteringAgreement, LightShapeIsTheProjectionOfTheNormalisedGaussi
   }
 }
 
-// Light from the face: twice the projection over the upper hemisphere, odd coefficients (l + m) only. The table's strata and rows
-// cost up to 1.5 % of the largest coefficient where a Gaussian straddles the horizon (64 strata across the step).
-TEST(MultipleScatteringAgreement, FaceLightIsProjectedOverTheUpperHemisphereOddly) {
+TEST(MultipleScatteringAgreement, FaceLightIsTheProjectionOfItsMomentsAboveTheHorizon) {
   for (const float sharpness : {0.0F, 2.0F, 30.0F, 150.0F}) {
     const MultipleScattering::LightShape shape(sharpness);
     for (const Vec3& axis : {Vec3(0.3F, -0.5F, 0.7F), Vec3(-0.9F, 0.2F, 0.05F), Vec3(0.4F, 0.6F, -0.1F), Vec3(0, 0, 1)}) {
@@ -186,22 +185,24 @@ TEST(MultipleScatteringAgreement, FaceLightIsProjectedOverTheUpperHemisphereOddl
                                2 * kPi / rings / azimuths;
           for (int l = 0; l <= 5; ++l) {
             for (int m = -l; m <= l; ++m) {
-              if ((l + m) % 2 == 0) continue;
               const auto j = static_cast<std::size_t>(l * (l + 1) + m);
-              expected[j] += 2 * light * y[j];
+              expected[j] += light * y[j];
             }
           }
         }
       }
+      std::array<float, sh_count(5)> dual;
+      std::transform(expected.begin(), expected.end(), dual.begin(), [](double x) { return static_cast<float>(x); });
+      HemisphereDual::of_order(5).apply(dual.data());
       for (std::size_t j = 0; j < got.size(); ++j) {
-        EXPECT_NEAR(got[j], expected[j], 0.015) << sharpness << ", axis " << unit.transpose() << ", " << j;
+        EXPECT_NEAR(got[j], dual[j], 0.03) << sharpness << ", axis " << unit.transpose() << ", " << j;
       }
     }
   }
 }
 
 // What it is for: a response that falls to 0 at the horizon is kept for light near the horizon. Response T(w) = w.z over the
-// face (Lambert's law): stored coefficients are its projection; continued oddly, every direction above gets its cosine.
+// face (Lambert's law): stored coefficients are its moments; every direction above gets its cosine.
 TEST(MultipleScatteringLaw, ACosineResponseHoldsDownToTheHorizon) {
   Transfer transfer = diagonal_transfer(5, {0, 0, 0}, false);
   std::array<double, sh_count(5)> stored{};
@@ -224,7 +225,8 @@ TEST(MultipleScatteringLaw, ACosineResponseHoldsDownToTheHorizon) {
     const double t = radians(degrees_from_normal);
     IncomingField field;
     multiple.incoming(0, directional, Vec3d(std::sin(t), 0, std::cos(t)).cast<float>(), field);
-    EXPECT_NEAR(field[0], std::cos(t), 1e-3) << degrees_from_normal;
+    // What order 5 leaves: 0.01 rms. Taken for 0 below the horizon, the response would be 0.1 off at 70 degrees already.
+    EXPECT_NEAR(field[0], std::cos(t), 0.02) << degrees_from_normal;
   }
 }
 

@@ -22,7 +22,6 @@ FabricPack open_pack(const FiberScattering& scattering, bool both_sides = false)
   pack.light_from_both_sides = both_sides;
   pack.materials.emplace_back(scattering);
   const std::size_t segments = pack.exemplar.segment_count();
-  pack.cell_of_segment.assign(segments, 0);
 
   SsdfVisibility ssdf;
   ssdf.components = 1;
@@ -44,8 +43,7 @@ FabricPack open_pack(const FiberScattering& scattering, bool both_sides = false)
   Transfer transfer;
   transfer.order = 0;
   transfer.both_sides = both_sides;
-  transfer.grid = {
-      {1, 1, 1}, pack.exemplar.width_mm, pack.exemplar.height_mm, pack.exemplar.z_min, pack.exemplar.z_max};
+  transfer.cell_of_segment.assign(segments, 0);
   transfer.matrices = {1, 1, 1};
   transfer.standard_error = {0, 0, 0};
   transfer.paths = {1};

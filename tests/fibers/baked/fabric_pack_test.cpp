@@ -52,7 +52,6 @@ TEST_F(FabricPackFormat, ComesBackAsWritten) {
   EXPECT_EQ(pack.exemplar.points, crossed_layers(test_cotton()).points);
   EXPECT_EQ(pack.materials.size(), 1U);
   EXPECT_FALSE(pack.ssdf || pack.sgs || pack.transfer || pack.volume);
-  EXPECT_TRUE(pack.cell_of_segment.empty());
 }
 
 TEST_F(FabricPackFormat, NamesOutsideThePackAreRefused) {

@@ -15,9 +15,9 @@ TEST(SegmentOriginsLaw, AFreeFiberIsExposedAtItsTop) {
   for (std::uint32_t s = 0; s < 4; ++s) {
     EXPECT_NEAR(origins.openness[s], 1, 0.02);
     const Vec3 offset = origins.position[s] - scene.exemplar().segment_midpoint(s);
-    EXPECT_NEAR(offset.norm(), 0.02F, 1e-5F);
+    EXPECT_NEAR(offset.norm(), kExposedDepth * 0.02F, 1e-5F);
     // 288 rays place the direction to about 0.1 rad.
-    EXPECT_GT(offset.z(), 0.02F * 0.9F);
+    EXPECT_GT(offset.z(), 0.02F * kExposedDepth * 0.9F);
   }
 }
 
@@ -43,7 +43,7 @@ TEST(SegmentOriginsLaw, PrintedChoiceIsTheMidpoint) {
     EXPECT_EQ(printed.position[s], scene.exemplar().segment_midpoint(s));
     const float distance = (exposed.position[s] - printed.position[s]).norm();
     if (distance > 0) {
-      EXPECT_NEAR(distance, scene.exemplar().radius_mm[scene.exemplar().segment_fiber[s]], 1e-5F);
+      EXPECT_NEAR(distance, kExposedDepth * scene.exemplar().radius_mm[scene.exemplar().segment_fiber[s]], 1e-5F);
       ++moved;
     } else {
       EXPECT_EQ(exposed.openness[s], 0);  // nothing to choose by
