@@ -71,24 +71,10 @@ Nodes root(const Nodes& x) {
   return x.max(0.0).sqrt();
 }
 
-// sin(x) for |x| <= pi/2 by its series, error 6e-12.
-template <class T>
-T sine_of(const T& x) {
-  const T z = x * x;
-  T p = z * (-1.0 / 1307674368000) + 1.0 / 6227020800;
-  p = p * z - 1.0 / 39916800;
-  p = p * z + 1.0 / 362880;
-  p = p * z - 1.0 / 5040;
-  p = p * z + 1.0 / 120;
-  p = p * z - 1.0 / 6;
-  p = p * z + 1.0;
-  return p * x;
-}
-
 // gc where |x - mean| <= pi.
 template <class T>
 T gaussian_near(const T& x, double mean, double sharpness) {
-  const T half_sine = sine_of(T(0.5 * (x - mean)));
+  const T half_sine = sine_of_quarter(T(0.5 * (x - mean)));
   return exponential(T(half_sine * half_sine * (-2 * sharpness)));
 }
 
@@ -114,7 +100,7 @@ class Primitive {
   template <class T>
   T narrow(const T& x) const {
     const double s = gaussian_.width;
-    const T t = sine_of(T(0.5 * (x - gaussian_.mean))) * (2 / s);
+    const T t = sine_of_quarter(T(0.5 * (x - gaussian_.mean))) * (2 / s);
     const T square = t * t;
     const T bell = exponential(T(-square));
     const T q = 1 / (1 + 0.3275911 * magnitude(t));
@@ -161,7 +147,7 @@ class Primitive {
   template <class T>
   T wide(const T& x) const {
     const T d = x - gaussian_.mean;
-    const T s = sine_of(T(0.5 * d));
+    const T s = sine_of_quarter(T(0.5 * d));
     const T sine = 2 * s * root(T(1 - s * s));
     const T twice_cosine = 2 - 4 * s * s;
     T b1 = 0 * d;
@@ -399,6 +385,63 @@ double clipped_gaussians_printed(const CircularGaussian& theta, const CircularGa
                                  const VisibilityLine& line) {
   const double gain = sigmoid_gain(theta.width, phi.width, line.theta_gradient, line.phi_gradient);
   return unoccluded_gaussians_printed(theta, phi) / (1 + std::exp(-gain * line.distance));
+}
+
+namespace {
+
+constexpr double kNarrowestGain = 0.005;
+constexpr double kWidestGain = 3;
+
+// The line's extent across the two Gaussians, limited as the domain limits it.
+double line_spread(double theta_width, double phi_width, double theta_gradient, double phi_gradient) {
+  return std::hypot(std::min(theta_width, kWidestGain) * theta_gradient,
+                    std::min(phi_width, kWidestGain) * phi_gradient);
+}
+
+}  // namespace
+
+SigmoidGains::SigmoidGains() {
+  for (int i = 0; i < kWidths; ++i) {
+    for (int j = 0; j < kWidths; ++j) {
+      for (int g = 0; g < kGradients; ++g) {
+        const double theta_width = kNarrowestGain * std::pow(kWidestGain / kNarrowestGain, i / (kWidths - 1.0));
+        const double phi_width = kNarrowestGain * std::pow(kWidestGain / kNarrowestGain, j / (kWidths - 1.0));
+        const double gradient = kHalfPi * g / (kGradients - 1.0);
+        gains_.push_back(sigmoid_gain(theta_width, phi_width, std::cos(gradient), std::sin(gradient)) *
+                         line_spread(theta_width, phi_width, std::cos(gradient), std::sin(gradient)));
+      }
+    }
+  }
+}
+
+double SigmoidGains::gain(double theta_width, double phi_width, double theta_gradient, double phi_gradient) const {
+  struct Between {
+    int low;
+    double share;
+  };
+  const auto between = [](double position, int count) {
+    const double at = std::clamp(position, 0.0, count - 1.0);
+    const int low = std::min(static_cast<int>(at), count - 2);
+    return Between{low, at - low};
+  };
+  const auto of_width = [&](double width) {
+    return between(std::log(width / kNarrowestGain) / std::log(kWidestGain / kNarrowestGain) * (kWidths - 1), kWidths);
+  };
+  const Between i = of_width(theta_width);
+  const Between j = of_width(phi_width);
+  const Between g =
+      between(std::atan2(std::abs(phi_gradient), std::abs(theta_gradient)) / kHalfPi * (kGradients - 1), kGradients);
+  double sum = 0;
+  for (int corner = 0; corner < 8; ++corner) {
+    const int a = corner & 1;
+    const int b = (corner >> 1) & 1;
+    const int c = corner >> 2;
+    const auto index = static_cast<std::size_t>(((i.low + a) * kWidths + j.low + b) * kGradients + g.low + c);
+    sum += (a != 0 ? i.share : 1 - i.share) * (b != 0 ? j.share : 1 - j.share) * (c != 0 ? g.share : 1 - g.share) *
+           gains_[index];
+  }
+  return sum / line_spread(std::max(theta_width, kNarrowestGain), std::max(phi_width, kNarrowestGain), theta_gradient,
+                           phi_gradient);
 }
 
 }  // namespace heddle

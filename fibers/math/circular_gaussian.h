@@ -9,6 +9,8 @@
 // Means lie in [-2 pi, 2 pi]; the domain is always [-pi/2, pi/2] in both angles. Tested, with all errors, in
 // tests/math/circular_gaussian_test.cpp.
 
+#include <vector>
+
 namespace heddle {
 
 struct CircularGaussian {
@@ -67,6 +69,20 @@ double visible_share(double theta_width, double phi_width, const VisibilityLine&
 /// Kappa of eq. 14: 1 / (1 + exp(-kappa d)) nearest to visible_share in the least-squares sense over the distances
 /// at which the line cuts the domain. About 2.4 / hypot(s theta_gradient, s' phi_gradient) for narrow Gaussians.
 double sigmoid_gain(double theta_width, double phi_width, double theta_gradient, double phi_gradient);
+
+/// Kappa of eq. 14 from a table, as the paper keeps it: widths from 0.005 to 3 (beyond, the nearest), gradients of any
+/// direction. Within 3 % of sigmoid_gain.
+class SigmoidGains {
+ public:
+  SigmoidGains();
+  double gain(double theta_width, double phi_width, double theta_gradient, double phi_gradient) const;
+
+ private:
+  static constexpr int kWidths = 24;
+  static constexpr int kGradients = 17;
+  std::vector<double>
+      gains_;  // [theta width][phi width][gradient from 0 to 90 degrees] times the spread of narrow Gaussians
+};
 
 }  // namespace heddle
 

@@ -290,6 +290,22 @@ TEST(CircularGaussianStability, PrintedFormFailsNearTheBorder) {
   EXPECT_NEAR(errors(1.5), 0.169, 0.03);
 }
 
+TEST(CircularGaussianAgreement, GainsFromTheTable) {
+  const SigmoidGains gains;
+  RandomStream random(8, RandomStage::kTest, 0, 0);
+  double worst = 0;
+  for (int k = 0; k < 300; ++k) {
+    const double theta_width = 0.005 * std::pow(600, random.uniform_double());
+    const double phi_width = 0.005 * std::pow(600, random.uniform_double());
+    const double gradient = 2 * kPi * random.uniform_double();
+    const double exact = sigmoid_gain(theta_width, phi_width, std::cos(gradient), std::sin(gradient));
+    const double from_table = gains.gain(theta_width, phi_width, std::cos(gradient), std::sin(gradient));
+    worst = std::max(worst, std::abs(from_table / exact - 1));
+  }
+  std::printf("  largest relative error of a gain: %.2g\n", worst);
+  EXPECT_LT(worst, 0.03);
+}
+
 TEST(CircularGaussianLaw, NothingIsNegativeOrNotFinite) {
   for (const Case& c : many_cases(6, 20000)) {
     const double value = clipped_gaussians(c.theta, c.phi, c.line);
