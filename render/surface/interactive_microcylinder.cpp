@@ -39,7 +39,12 @@ struct Average {
   Nodes at;
   Nodes weight;
 };
+Average one_node(double at) {
+  return {Nodes::Constant(std::clamp(at, -kHalfPi, kHalfPi)), Nodes::Constant(1.0 / kSide)};
+}
 Average average_over(const CircularGaussian& gaussian) {
+  // Over 4 degrees smooth factors change by less than what else is neglected.
+  if (gaussian.width < 0.07) return one_node(gaussian.mean);
   static const QuadratureRule& rule = gauss_legendre(kSide);
   const double reach = gaussian.width < 1.1 ? 2 * std::asin(0.9 * gaussian.width) : kPi;  // 1.8 widths
   const double begin = std::clamp(gaussian.mean - reach, -kHalfPi, kHalfPi);
@@ -218,7 +223,7 @@ Rgbd InteractiveMicrocylinder::shade(const Mat3d& frame, const Vec3d& wo, std::s
         Average phi;
         if (settings_.printed) {
           weight = table_.value(t, outgoing, axis, sharpness);
-          theta = {Nodes::Constant(std::clamp(theta_l, -kHalfPi, kHalfPi)), Nodes::Constant(1.0 / kSide)};
+          theta = one_node(theta_l);
           phi = {Nodes::Constant(o.phi + std::remainder(k.phi - o.phi, 2 * kPi)), Nodes::Constant(1.0 / kSide)};
         } else {
           const Angles at = around.inside();

@@ -198,7 +198,7 @@ void compare_drape(const Options& options) {
 
   Vec3d middle = Vec3d::Zero();
   for (const Vec3& p : cloth.mesh.positions) middle += p.cast<double>() / static_cast<double>(cloth.frames.size());
-  const Rasterizer rasterizer(cloth, middle + Vec3d(350, -450, 250), middle);
+  const Rasterizer rasterizer(cloth, middle + Vec3d(260, -340, 190), middle);
   std::vector<std::uint32_t> facing;
   for (std::uint32_t v = 0; v < cloth.frames.size(); ++v) {
     if (rasterizer.to_eye(v).dot(cloth.frames[v].col(2).cast<double>()) > 0.02) facing.push_back(v);
