@@ -27,6 +27,20 @@ std::vector<double> spherical_bessel_ratios(int order, double x);
 double erf_difference(double a, double b);
 float erf_difference(float a, float b);
 
+/// sin(x) for |x| <= pi/2 by its series, error 6e-12; for a number or an Eigen array, of which it makes vector code.
+template <class T>
+T sine_of_quarter(const T& x) {
+  const T z = x * x;
+  T p = z * (-1.0 / 1307674368000) + 1.0 / 6227020800;
+  p = p * z - 1.0 / 39916800;
+  p = p * z + 1.0 / 362880;
+  p = p * z - 1.0 / 5040;
+  p = p * z + 1.0 / 120;
+  p = p * z - 1.0 / 6;
+  p = p * z + 1.0;
+  return p * x;
+}
+
 /// Mean of cos^2 over a Gaussian cut to [-pi/2, pi/2]:
 ///   Gn(mu; beta) = 1 / (sqrt(2 pi) beta) * integral over [-pi/2, pi/2] of exp(-(t - mu)^2 / (2 beta^2))
 ///   cos^2(t) dt,

@@ -26,6 +26,7 @@ constexpr Quantity kQuantities[] = {
     {"bcsdf", eval_bcsdf},
     {"bcsdf_albedo", eval_bcsdf_albedo},
     {"bcsdf_sh", eval_bcsdf_sh},
+    {"clipped_gaussians", eval_clipped_gaussians},
     {"microcylinder", eval_microcylinder},
     {"sg_mass", eval_sg_mass},
     {"sg_product", eval_sg_product},

@@ -27,6 +27,9 @@ nlohmann::json eval_sh_rotate(EvalObject& request);
 nlohmann::json eval_microcylinder(EvalObject& request);
 nlohmann::json eval_thread(EvalObject& request);
 
+// eval_clipped_gaussians.cpp
+nlohmann::json eval_clipped_gaussians(EvalObject& request);
+
 // eval_visibility.cpp
 nlohmann::json eval_visibility(EvalObject& request);
 

@@ -121,5 +121,15 @@ TEST(SpecialFunctionsAgreement, GaussianCos2MeanAgainstPanels) {
   }
 }
 
+TEST(SpecialFunctionsAgreement, SineOfAQuarterTurn) {
+  Eigen::Array<double, 9, 1> x;
+  for (int k = 0; k < 9; ++k) x[k] = 0.5 * kPi * (k - 4) / 4.0;
+  const Eigen::Array<double, 9, 1> sines = sine_of_quarter(x);
+  for (int k = 0; k < 9; ++k) {
+    EXPECT_NEAR(sine_of_quarter(x[k]), std::sin(x[k]), 7e-12);
+    EXPECT_NEAR(sines[k], std::sin(x[k]), 7e-12);
+  }
+}
+
 }  // namespace
 }  // namespace heddle

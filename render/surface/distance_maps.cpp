@@ -1,0 +1,148 @@
+#include "render/surface/distance_maps.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/QR>
+
+#include "fibers/math/random.h"
+#include "fibers/math/signed_distance.h"
+#include "fibers/math/spherical_map.h"
+
+namespace heddle {
+namespace {
+
+using Matrix = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+// Patch directions in the grid's frame: its pole is x. A reflection, which leaves distances alone.
+Vec3d swapped(const Vec3d& w) {
+  return {w.z(), w.y(), w.x()};
+}
+
+// [component][column of `data`] the directions of largest variance, by subspace iteration; orthonormal rows.
+Matrix principal_components(const Matrix& data, Eigen::Index count) {
+  constexpr int kSpare = 8;
+  constexpr int kIterations = 4;
+  const Eigen::Index tried = std::min({count + kSpare, data.rows(), data.cols()});
+  Eigen::MatrixXf space(data.cols(), tried);
+  RandomStream random(0, RandomStage::kPca, 0, 0);
+  for (Eigen::Index k = 0; k < space.size(); ++k) space.data()[k] = random.uniform() - 0.5F;
+  for (int k = 0; k < kIterations; ++k) {
+    const Eigen::MatrixXf image = data.transpose() * (data * space);
+    space = Eigen::HouseholderQR<Eigen::MatrixXf>(image).householderQ() * Eigen::MatrixXf::Identity(data.cols(), tried);
+  }
+  const Eigen::MatrixXd within = (data * space).cast<double>();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(within.transpose() * within);
+  return (space * solver.eigenvectors().rightCols(count).rowwise().reverse().cast<float>()).transpose();
+}
+
+}  // namespace
+
+DistanceMaps::DistanceMaps(std::span<const Mat3> frames, const Visible& visible, const DistanceMapSettings& settings)
+    : resolution_(settings.resolution) {
+  assert(!frames.empty() && settings.resolution >= 4 && settings.terms >= 0);
+  const LatLongGrid grid(resolution_);
+  const auto cells = static_cast<Eigen::Index>(grid.cell_count());
+  const auto vertices = static_cast<Eigen::Index>(frames.size());
+
+  // Signed distances of all vertices, [vertex][cell].
+  Matrix distances(vertices, cells);
+  const SignedDistanceTransform transform(resolution_);
+  tbb::parallel_for(Eigen::Index{0}, vertices, [&](Eigen::Index v) {
+    SphericalMap map(resolution_);
+    for (int row = 0; row < resolution_; ++row) {
+      for (int column = 0; column < resolution_; ++column) {
+        const Vec3d local = swapped(grid.centre(row, column));
+        if (local.z() <= 0) continue;
+        const Vec3 world = frames[static_cast<std::size_t>(v)] * local.cast<float>();
+        map.set(row, column, visible(static_cast<std::uint32_t>(v), world));
+      }
+    }
+    transform(map, distances.row(v).data());
+  });
+
+  // Components over the vertices, cells weighted by solid angle; below the horizon, where only the far ends of Gaussians
+  // are evaluated, by a tenth of it.
+  Eigen::RowVectorXf weight(cells);
+  double whole = 0;
+  for (int row = 0, k = 0; row < resolution_; ++row) {
+    for (int column = 0; column < resolution_; ++column, ++k) {
+      const bool above = swapped(grid.centre(row, column)).z() > 0;
+      weight[k] = static_cast<float>(std::sqrt(grid.solid_angle(row) * (above ? 1 : 0.1)));
+      whole += static_cast<double>(weight[k] * weight[k]);
+    }
+  }
+  const Eigen::RowVectorXf mean = distances.colwise().mean();
+  Matrix scaled = (distances.rowwise() - mean).array().rowwise() * weight.array();
+  const Eigen::Index terms = std::min<Eigen::Index>({settings.terms, vertices, cells});
+  const Matrix components = terms > 0 ? principal_components(scaled, terms) : Matrix(0, cells);
+  const Matrix shares = scaled * components.transpose();  // [vertex][component]
+  scaled -= shares * components;
+  compression_error_ = std::sqrt(static_cast<double>(scaled.squaredNorm()) / (whole * static_cast<double>(vertices)));
+
+  stride_ = (static_cast<std::size_t>(terms) + 1 + 7) / 8 * 8;
+  basis_.assign(static_cast<std::size_t>(cells) * stride_, 0.0F);
+  for (Eigen::Index cell = 0; cell < cells; ++cell) {
+    float* const at = &basis_[static_cast<std::size_t>(cell) * stride_];
+    at[0] = mean[cell];
+    for (Eigen::Index k = 0; k < terms; ++k) at[k + 1] = components(k, cell) / weight[cell];
+  }
+  coefficients_.assign(static_cast<std::size_t>(vertices) * stride_, 0.0F);
+  for (Eigen::Index v = 0; v < vertices; ++v) {
+    float* const at = &coefficients_[static_cast<std::size_t>(v) * stride_];
+    at[0] = 1;
+    for (Eigen::Index k = 0; k < terms; ++k) at[k + 1] = shares(v, k);
+  }
+}
+
+SignedDistance DistanceMaps::evaluate(std::span<const float> coefficients, const Vec3d& direction) const {
+  assert(coefficients.size() == stride_);
+  const Vec3d w = swapped(direction);
+  const double step_polar = kPi / resolution_;
+  const double step_azimuth = 2 * kPi / resolution_;
+  const double sine = std::max(std::hypot(w.x(), w.y()), 1e-9);
+  const double row = std::atan2(sine, w.z()) / step_polar - 0.5;
+  const double column = std::atan2(w.y(), w.x()) / step_azimuth - 0.5;
+  // Bilinear between cell centres, continued half a cell to the poles.
+  const int r = std::clamp(static_cast<int>(std::floor(row)), 0, resolution_ - 2);
+  const double c_floor = std::floor(column);
+  const int c0 = (static_cast<int>(c_floor) + resolution_) % resolution_;
+  const int c1 = (c0 + 1) % resolution_;
+  const double down = row - r;
+  const double across = column - c_floor;
+  const auto cell = [&](int i, int j) {
+    const float* const basis = &basis_[(static_cast<std::size_t>(i) * resolution_ + j) * stride_];
+    return static_cast<double>(
+        Eigen::Map<const Eigen::VectorXf>(basis, static_cast<Eigen::Index>(stride_))
+            .dot(Eigen::Map<const Eigen::VectorXf>(coefficients.data(), static_cast<Eigen::Index>(stride_))));
+  };
+  const double v00 = cell(r, c0);
+  const double v01 = cell(r, c1);
+  const double v10 = cell(r + 1, c0);
+  const double v11 = cell(r + 1, c1);
+  const double upper = std::lerp(v00, v01, across);
+  const double lower = std::lerp(v10, v11, across);
+  const double by_polar = (lower - upper) / step_polar;
+  const double by_azimuth = std::lerp(v01 - v00, v11 - v10, down) / (step_azimuth * sine);
+  const Vec3d along_azimuth(-w.y() / sine, w.x() / sine, 0);
+  const Vec3d along_polar(w.x() / sine * w.z(), w.y() / sine * w.z(), -sine);
+  const Vec3d gradient = swapped(by_polar * along_polar + by_azimuth * along_azimuth);
+  const double length = gradient.norm();
+  return {std::lerp(upper, lower, down), length > 1e-6 ? Vec3d(gradient / length) : Vec3d(Vec3d::Zero())};
+}
+
+VisibilityLine visibility_line(const SignedDistance& at, double cos_theta, const Vec3d& along_theta,
+                               const Vec3d& along_phi) {
+  const double theta = at.gradient.dot(along_theta);
+  const double phi = at.gradient.dot(along_phi) * cos_theta;
+  const double length = std::hypot(theta, phi);
+  constexpr double kFar = 100;  // radians: beyond everything
+  if (length < 1e-9) return {at.distance > 0 ? kFar : -kFar, 1, 0};
+  return {at.distance / length, theta / length, phi / length};
+}
+
+}  // namespace heddle

@@ -1,0 +1,282 @@
+#include "render/surface/weighting_table.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+
+#include <Eigen/Eigenvalues>
+
+#include "render/surface/tangent_curve.h"
+
+namespace heddle {
+namespace {
+
+// eq. 9 and 13 of Sadeghi et al.: a product where two cosines are independent, the lesser one where both directions are close.
+double blended(double u, double a, double b) {
+  return (1 - u) * a * b + u * std::min(a, b);
+}
+
+double squared_angle(double a, double b) {
+  const double d = std::remainder(a - b, 2 * kPi);
+  return d * d;
+}
+
+struct Terms {
+  double masking = 0;     // M
+  double projection = 0;  // P
+};
+
+Terms terms_of(const TangentSample& tangent, double blend, const Vec3d& wi, const Vec3d& wo) {
+  const Mat3d frame = tangent.frame();
+  const Vec3d i = frame.transpose() * wi;
+  const Vec3d o = frame.transpose() * wo;
+  if (i.z() <= 0 || o.z() <= 0) return {};
+  const double exponent = -0.5 / (blend * blend);
+  const double u_phi = std::exp(exponent * squared_angle(std::atan2(i.y(), i.z()), std::atan2(o.y(), o.z())));
+  const double u_psi = std::exp(exponent * squared_angle(std::atan2(i.x(), i.z()), std::atan2(o.x(), o.z())));
+  return {blended(u_phi, i.z() / std::hypot(i.y(), i.z()), o.z() / std::hypot(o.y(), o.z())),
+          blended(u_psi, i.z() / std::hypot(i.x(), i.z()), o.z() / std::hypot(o.x(), o.z()))};
+}
+
+Vec3d spherical(double polar, double azimuth) {
+  return {std::sin(polar) * std::cos(azimuth), std::sin(polar) * std::sin(azimuth), std::cos(polar)};
+}
+
+// Bilinear position in a grid whose first and last rows are polar angles 0 and `last`, and whose columns go around.
+struct GridPosition {
+  std::array<std::size_t, 4> cell;
+  std::array<double, 4> weight;
+};
+GridPosition grid_position(const Vec3d& direction, int rows, int columns, double last) {
+  const double polar = std::atan2(std::hypot(direction.x(), direction.y()), direction.z());
+  const double row = std::min(polar / last, 1.0) * (rows - 1);
+  double column = std::atan2(direction.y(), direction.x()) / (2 * kPi) * columns;
+  if (column < 0) column += columns;
+  const int r = std::min(static_cast<int>(row), rows - 2);
+  const int c0 = static_cast<int>(column) % columns;
+  const int c1 = (c0 + 1) % columns;
+  const double down = row - r;
+  const double across = column - std::floor(column);
+  const auto at = [&](int i, int j) { return static_cast<std::size_t>(i) * static_cast<std::size_t>(columns) + j; };
+  return {{at(r, c0), at(r, c1), at(r + 1, c0), at(r + 1, c1)},
+          {(1 - down) * (1 - across), (1 - down) * across, down * (1 - across), down * across}};
+}
+
+// W is 0 at the horizon itself; the last row of a table of directions stands just above it.
+constexpr double kLastPolar = radians(89);
+
+}  // namespace
+
+Mat3d TangentSample::frame() const {
+  Mat3d result;
+  if (direction == 1) {
+    result.col(0) = Vec3d(cosine, 0, sine);
+    result.col(2) = Vec3d(-sine, 0, cosine);
+  } else {
+    result.col(0) = Vec3d(0, cosine, sine);
+    result.col(2) = Vec3d(0, -sine, cosine);
+  }
+  result.col(1) = result.col(2).cross(result.col(0));
+  return result;
+}
+
+std::vector<TangentSample> tangent_samples(const MicrocylinderFabric& fabric, int most) {
+  assert(most >= 1);
+  std::vector<TangentSample> samples;
+  for (std::size_t j = 0; j < fabric.threads.size(); ++j) {
+    const MicrocylinderThread& thread = fabric.threads[j];
+    const std::vector<TangentPiece> pieces = tangent_distribution(thread.offsets, thread.lengths);
+    double range = 0;
+    for (const TangentPiece& piece : pieces) range += piece.end - piece.begin;
+    const ThreadScattering scattering(thread.scattering, fabric.conventions);
+    const double step = std::max(1.5 * scattering.surface_deviation(), range / most);
+    for (const TangentPiece& piece : pieces) {
+      const double extent = piece.end - piece.begin;
+      const int count = std::max(1, static_cast<int>(std::ceil(extent / step - 1e-9)));
+      for (int k = 0; k < count; ++k) {
+        const double angle = piece.begin + extent * (k + 0.5) / count;
+        samples.push_back({static_cast<int>(j), thread.direction, std::sin(angle), std::cos(angle), piece.share / count,
+                           extent / count / std::sqrt(12.0)});
+      }
+    }
+  }
+  return samples;
+}
+
+std::vector<double> thread_weights(const MicrocylinderFabric& fabric, std::span<const TangentSample> tangents,
+                                   Weighting weighting, const Vec3d& wi, const Vec3d& wo) {
+  std::vector<double> weights(tangents.size(), 0.0);
+  if (wi.z() <= 0 || wo.z() <= 0) return weights;
+  double covered = 0;
+  for (const MicrocylinderThread& thread : fabric.threads) covered += thread.share;
+  const bool printed = weighting == Weighting::kPrinted;
+  double whole = printed ? 0 : std::max(0.0, 1 - covered) * wo.z();  // Q
+  for (std::size_t t = 0; t < tangents.size(); ++t) {
+    const double area = fabric.threads[static_cast<std::size_t>(tangents[t].thread)].share;
+    const Terms terms = terms_of(tangents[t], fabric.conventions.blend, wi, wo);
+    whole += terms.projection * (printed ? 1 : area * tangents[t].share);
+    weights[t] = terms.masking * terms.projection * area * (printed ? 1 : tangents[t].share);
+  }
+  for (double& weight : weights) weight = whole > 0 ? weight / whole : 0;
+  return weights;
+}
+
+WeightingTable::WeightingTable(const MicrocylinderFabric& fabric, std::span<const TangentSample> tangents,
+                               Weighting weighting, const WeightingTableSettings& settings)
+    : columns_(settings.columns), wo_rows_(settings.rows), axis_rows_(2 * settings.rows) {
+  assert(settings.columns >= 4 && settings.rows >= 2 && !tangents.empty());
+  // Directions of light that are averaged, and those of the table, which are the limit of great sharpness.
+  struct Incoming {
+    Vec3d direction;
+    double solid_angle;
+  };
+  std::vector<Incoming> incoming;
+  const int fine_rows = 2 * settings.rows;
+  const int fine_columns = 2 * settings.columns;
+  for (int row = 0; row < fine_rows; ++row) {
+    const double polar = 0.5 * kPi * (row + 0.5) / fine_rows;
+    for (int column = 0; column < fine_columns; ++column) {
+      incoming.push_back({spherical(polar, 2 * kPi * (column + 0.5) / fine_columns), std::sin(polar)});
+    }
+  }
+  std::vector<Vec3d> axes;
+  for (int row = 0; row < axis_rows_; ++row) {
+    for (int column = 0; column < columns_; ++column) {
+      axes.push_back(spherical(kPi * row / (axis_rows_ - 1), 2 * kPi * column / columns_));
+    }
+  }
+  std::vector<Vec3d> outgoing;
+  for (int row = 0; row < wo_rows_; ++row) {
+    for (int column = 0; column < columns_; ++column) {
+      outgoing.push_back(spherical(kLastPolar * row / (wo_rows_ - 1), 2 * kPi * column / columns_));
+    }
+  }
+
+  // W of all tangents, [tangent](incoming then axes, outgoing). Axes below the horizon stand for directions on it.
+  const auto fine = static_cast<Eigen::Index>(incoming.size());
+  const auto coarse = static_cast<Eigen::Index>(axes.size());
+  const auto seen = static_cast<Eigen::Index>(outgoing.size());
+  std::vector<Eigen::MatrixXf> weights(tangents.size(), Eigen::MatrixXf(fine + coarse, seen));
+  tbb::parallel_for(Eigen::Index{0}, seen, [&](Eigen::Index o) {
+    for (Eigen::Index i = 0; i < fine + coarse; ++i) {
+      Vec3d wi = i < fine ? incoming[static_cast<std::size_t>(i)].direction : axes[static_cast<std::size_t>(i - fine)];
+      const double horizon = std::cos(kLastPolar);
+      if (wi.z() < horizon) {
+        const double across = std::hypot(wi.x(), wi.y());
+        const double azimuth = across > 0 ? std::atan2(wi.y(), wi.x()) : 0;
+        wi = spherical(kLastPolar, azimuth);
+      }
+      const std::vector<double> w =
+          thread_weights(fabric, tangents, weighting, wi, outgoing[static_cast<std::size_t>(o)]);
+      for (std::size_t t = 0; t < w.size(); ++t) weights[t](i, o) = static_cast<float>(w[t]);
+    }
+  });
+
+  // Averages over Gaussians as matrices, (axis, incoming), one per finite sharpness.
+  std::vector<Eigen::MatrixXf> averages(kLevels - 1, Eigen::MatrixXf(coarse, fine));
+  tbb::parallel_for(0, kLevels - 1, [&](int level) {
+    const double sharpness = level == 0 ? 0 : kSharpnesses[static_cast<std::size_t>(level - 1)];
+    Eigen::MatrixXf& average = averages[static_cast<std::size_t>(level)];
+    for (Eigen::Index a = 0; a < coarse; ++a) {
+      double nearest = -1;
+      for (const Incoming& in : incoming) {
+        nearest = std::max(nearest, in.direction.dot(axes[static_cast<std::size_t>(a)]));
+      }
+      double whole = 0;
+      for (Eigen::Index i = 0; i < fine; ++i) {
+        const Incoming& in = incoming[static_cast<std::size_t>(i)];
+        const double cosine = in.direction.dot(axes[static_cast<std::size_t>(a)]);
+        const double value = in.solid_angle * std::exp(sharpness * (cosine - nearest));
+        average(a, i) = static_cast<float>(value);
+        whole += value;
+      }
+      average.row(a) /= static_cast<float>(whole);
+    }
+  });
+
+  ranks_.resize(tangents.size());
+  wo_.resize(tangents.size());
+  axis_.resize(tangents.size());
+  tbb::parallel_for(std::size_t{0}, tangents.size(), [&](std::size_t t) {
+    Eigen::MatrixXf stacked(kLevels * coarse, seen);
+    for (int level = 0; level < kLevels - 1; ++level) {
+      stacked.middleRows(level * coarse, coarse).noalias() =
+          averages[static_cast<std::size_t>(level)] * weights[t].topRows(fine);
+    }
+    stacked.bottomRows(coarse) = weights[t].bottomRows(coarse);
+    weights[t].resize(0, 0);
+    // Singular values and right vectors from the smaller Gram matrix.
+    const Eigen::MatrixXd gram = (stacked.transpose() * stacked).cast<double>();
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(gram);
+    const Eigen::VectorXd singular = solver.eigenvalues().cwiseMax(0.0).cwiseSqrt().reverse();
+    double kept = 0;
+    Eigen::Index rank = 0;
+    while (rank < seen && kept < settings.contribution * singular.sum()) kept += singular[rank++];
+    rank = std::max<Eigen::Index>(rank, 1);
+    ranks_[t] = static_cast<int>(rank);
+    using RowMajor = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+    const RowMajor right = solver.eigenvectors().rightCols(rank).rowwise().reverse().cast<float>();
+    const RowMajor left = stacked * right;
+    wo_[t].assign(right.data(), right.data() + right.size());
+    axis_[t].assign(left.data(), left.data() + left.size());
+  });
+  first_.push_back(0);
+  for (const int rank : ranks_) first_.push_back(first_.back() + static_cast<std::size_t>(rank));
+}
+
+WeightingTable::Outgoing WeightingTable::outgoing(const Vec3d& wo) const {
+  const GridPosition position = grid_position(wo, wo_rows_, columns_, kLastPolar);
+  Outgoing result(first_.back());
+  for (std::size_t t = 0; t < ranks_.size(); ++t) {
+    const auto rank = static_cast<Eigen::Index>(ranks_[t]);
+    Eigen::Map<Eigen::VectorXf> sum(&result[first_[t]], rank);
+    sum.setZero();
+    for (std::size_t k = 0; k < 4; ++k) {
+      const float* const values = &wo_[t][position.cell[k] * static_cast<std::size_t>(rank)];
+      sum += static_cast<float>(position.weight[k]) * Eigen::Map<const Eigen::VectorXf>(values, rank);
+    }
+  }
+  return result;
+}
+
+double WeightingTable::value(std::size_t tangent, const Outgoing& outgoing, const Vec3d& axis, double sharpness) const {
+  // Position between levels: linear in sharpness up to the first, in its logarithm, and in 1 / sharpness beyond the last.
+  constexpr double kFirst = kSharpnesses.front();
+  constexpr double kLast = kSharpnesses.back();
+  double level = 0;
+  if (sharpness < kFirst) {
+    level = sharpness / kFirst;
+  } else if (sharpness < kLast) {
+    level = 1 + std::log2(sharpness / kFirst) / 2;
+  } else {
+    level = kLevels - 1 - kLast / sharpness;
+  }
+  const int low = std::min(static_cast<int>(level), kLevels - 2);
+  const double share = level - low;
+  const GridPosition position = grid_position(axis, axis_rows_, columns_, kPi);
+  const auto rank = static_cast<Eigen::Index>(ranks_[tangent]);
+  const Eigen::Map<const Eigen::VectorXf> right(&outgoing[first_[tangent]], rank);
+  const auto cells = static_cast<std::size_t>(axis_rows_) * static_cast<std::size_t>(columns_);
+  double sum = 0;
+  for (int side = 0; side < 2; ++side) {
+    const double of_level = side == 0 ? 1 - share : share;
+    if (of_level == 0) continue;
+    const std::size_t base = static_cast<std::size_t>(low + side) * cells;
+    for (std::size_t k = 0; k < 4; ++k) {
+      const float* const values = &axis_[tangent][(base + position.cell[k]) * static_cast<std::size_t>(rank)];
+      sum += of_level * position.weight[k] *
+             static_cast<double>(Eigen::Map<const Eigen::VectorXf>(values, rank).dot(right));
+    }
+  }
+  return std::max(sum, 0.0);
+}
+
+std::size_t WeightingTable::bytes() const {
+  std::size_t count = 0;
+  for (std::size_t t = 0; t < wo_.size(); ++t) count += wo_[t].size() + axis_[t].size();
+  return sizeof(float) * count;
+}
+
+}  // namespace heddle

@@ -1,0 +1,179 @@
+#include "render/surface/weighting_table.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "fibers/math/random.h"
+#include "fibers/math/sampling.h"
+
+namespace heddle {
+namespace {
+
+Vec3d upper_direction(RandomStream& random) {
+  return sample_hemisphere(Vec3(0, 0, 1), random).cast<double>().normalized();
+}
+
+MicrocylinderThread thread_of(int direction, double share, std::vector<double> offsets_deg,
+                              std::vector<double> lengths) {
+  MicrocylinderThread thread;
+  thread.direction = direction;
+  thread.share = share;
+  thread.scattering = {1.4, Rgbd(0.3, 0.2, 0.1), 0.3, radians(10), radians(20)};
+  for (double& offset : offsets_deg) offset = radians(offset);
+  thread.offsets = offsets_deg;
+  thread.lengths = std::move(lengths);
+  return thread;
+}
+
+MicrocylinderFabric plain(double share) {
+  MicrocylinderFabric fabric;
+  fabric.threads = {thread_of(1, share, {-25, 25}, {1}), thread_of(2, share, {-25, 25}, {1})};
+  return fabric;
+}
+
+TEST(TangentSamples, StandForTheWholeCurve) {
+  MicrocylinderFabric fabric;
+  fabric.threads = {thread_of(1, 0.7, {-35, -35, 35, 35}, {1, 2, 1}), thread_of(2, 0.3, {0, 0}, {1})};
+  const std::vector<TangentSample> samples = tangent_samples(fabric, 20);
+  std::vector<double> share(2, 0.0);
+  for (const TangentSample& sample : samples) {
+    share[static_cast<std::size_t>(sample.thread)] += sample.share;
+    EXPECT_NEAR(std::hypot(sample.sine, sample.cosine), 1, 1e-14);
+    const Mat3d frame = sample.frame();
+    EXPECT_LT((frame * frame.transpose() - Mat3d::Identity()).cwiseAbs().maxCoeff(), 1e-14);
+    EXPECT_NEAR(frame.determinant(), 1, 1e-14);
+    EXPECT_NEAR(frame(2, 0), sample.sine, 1e-14) << "tangents rise along the thread";
+    EXPECT_GT(frame(2, 2), 0) << "normals look up";
+  }
+  EXPECT_NEAR(share[0], 1, 1e-12);
+  EXPECT_NEAR(share[1], 1, 1e-12);
+  // Two flat segments, and 70 degrees in parts of at most 15; one flat segment.
+  EXPECT_EQ(samples.size(), 2U + 5U + 1U);
+  EXPECT_EQ(samples[0].deviation, 0);
+  EXPECT_EQ(tangent_samples(fabric, 2).size(), 2U + 2U + 1U);
+}
+
+TEST(ThreadWeightsLaw, SharesOfOneAtMost) {
+  const MicrocylinderFabric fabric = plain(0.5);
+  const std::vector<TangentSample> tangents = tangent_samples(fabric, 16);
+  RandomStream random(1, RandomStage::kTest, 0, 0);
+  for (int k = 0; k < 500; ++k) {
+    const Vec3d wi = upper_direction(random);
+    const Vec3d wo = upper_direction(random);
+    double sum = 0;
+    for (const double weight : thread_weights(fabric, tangents, Weighting::kConsistent, wi, wo)) {
+      EXPECT_GE(weight, 0);
+      sum += weight;
+    }
+    EXPECT_LE(sum, 1 + 1e-12);
+    // M = P = 1 in the middle.
+    if (k > 0) continue;
+    const Vec3d up(0, 0, 1);
+    const MicrocylinderFabric flat = {{}, false, {thread_of(1, 0.5, {0, 0}, {1}), thread_of(2, 0.5, {0, 0}, {1})}};
+    const std::vector<double> straight = thread_weights(flat, tangent_samples(flat, 4), Weighting::kConsistent, up, up);
+    EXPECT_NEAR(straight[0] + straight[1], 1, 1e-12);
+  }
+  const std::vector<double> below =
+      thread_weights(fabric, tangents, Weighting::kConsistent, Vec3d(0, 0.6, -0.8), Vec3d(0, 0, 1));
+  for (const double weight : below) EXPECT_EQ(weight, 0);
+}
+
+// Two threads of one half with equally many samples, no gap: the printed weights are half of Sadeghi's.
+TEST(ThreadWeightsLaw, PrintedWeightsAreHalf) {
+  const MicrocylinderFabric fabric = plain(0.5);
+  const std::vector<TangentSample> tangents = tangent_samples(fabric, 16);
+  RandomStream random(2, RandomStage::kTest, 0, 0);
+  for (int k = 0; k < 200; ++k) {
+    const Vec3d wi = upper_direction(random);
+    const Vec3d wo = upper_direction(random);
+    const std::vector<double> consistent = thread_weights(fabric, tangents, Weighting::kConsistent, wi, wo);
+    const std::vector<double> printed = thread_weights(fabric, tangents, Weighting::kPrinted, wi, wo);
+    for (std::size_t t = 0; t < tangents.size(); ++t) EXPECT_NEAR(printed[t], 0.5 * consistent[t], 1e-13);
+  }
+}
+
+TEST(ThreadWeightsLaw, GapsTakeTheirShareOfTheConsistentWeights) {
+  const std::vector<TangentSample> tangents = tangent_samples(plain(0.5), 16);
+  const Vec3d up(0, 0, 1);
+  double sum = 0;
+  for (const double w : thread_weights(plain(0.25), tangents, Weighting::kConsistent, up, up)) sum += w;
+  double full = 0;
+  for (const double w : thread_weights(plain(0.5), tangents, Weighting::kConsistent, up, up)) full += w;
+  // <M P> / (<P> + 1) against <M P> / <P>, P = cos of four tangents within +-25 degrees.
+  const double p = 0.5 * (std::cos(radians(50.0 / 8)) + std::cos(radians(150.0 / 8)));
+  EXPECT_NEAR(sum / full, p / (p + 1), 1e-12);
+}
+
+double direct(const MicrocylinderFabric& fabric, const std::vector<TangentSample>& tangents, std::size_t tangent,
+              const Vec3d& axis, double sharpness, const Vec3d& wo) {
+  constexpr int kRows = 60;
+  double sum = 0;
+  double whole = 0;
+  for (int i = 0; i < kRows; ++i) {
+    const double polar = 0.5 * kPi * (i + 0.5) / kRows;
+    for (int j = 0; j < 4 * kRows; ++j) {
+      const double azimuth = 2 * kPi * (j + 0.5) / (4 * kRows);
+      const Vec3d wi(std::sin(polar) * std::cos(azimuth), std::sin(polar) * std::sin(azimuth), std::cos(polar));
+      const double value = std::sin(polar) * std::exp(sharpness * (wi.dot(axis) - 1));
+      whole += value;
+      if (value < 1e-9) continue;
+      sum += value * thread_weights(fabric, tangents, Weighting::kConsistent, wi, wo)[tangent];
+    }
+  }
+  return sum / whole;
+}
+
+TEST(WeightingTableAgreement, TableAgainstDirectAverages) {
+  const MicrocylinderFabric fabric = plain(0.4);
+  const std::vector<TangentSample> tangents = tangent_samples(fabric, 2);
+  WeightingTableSettings settings;
+  settings.columns = 32;
+  settings.rows = 16;
+  settings.contribution = 0.99;
+  const WeightingTable table(fabric, tangents, Weighting::kConsistent, settings);
+  EXPECT_EQ(table.ranks().size(), tangents.size());
+  RandomStream random(3, RandomStage::kTest, 0, 0);
+  double squares = 0;
+  double norm = 0;
+  double worst = 0;
+  for (int k = 0; k < 40; ++k) {
+    const Vec3d wo = upper_direction(random);
+    Vec3d axis = upper_direction(random);
+    if (k % 8 == 0) axis.z() *= -0.3;
+    axis.normalize();
+    const double sharpness = (std::vector<double>{0, 1, 5, 40, 300})[static_cast<std::size_t>(k % 5)];
+    const auto t = static_cast<std::size_t>(k) % tangents.size();
+    const double exact = direct(fabric, tangents, t, axis, sharpness, wo);
+    const double value = table.value(t, table.outgoing(wo), axis, sharpness);
+    squares += (value - exact) * (value - exact);
+    norm += exact * exact;
+    worst = std::max(worst, std::abs(value - exact));
+  }
+  std::printf("  table: relative RMS %.4f, worst %.4f\n", std::sqrt(squares / norm), worst);
+  EXPECT_LT(std::sqrt(squares / norm), 0.03);
+  EXPECT_LT(worst, 0.03);
+}
+
+TEST(WeightingTable, FewerSingularValuesForLessContribution) {
+  const MicrocylinderFabric fabric = plain(0.5);
+  const std::vector<TangentSample> tangents = tangent_samples(fabric, 1);
+  WeightingTableSettings settings;
+  settings.columns = 12;
+  settings.rows = 6;
+  std::size_t before = 0;
+  for (const double contribution : {0.5, 0.9, 0.99}) {
+    settings.contribution = contribution;
+    const WeightingTable table(fabric, tangents, Weighting::kConsistent, settings);
+    EXPECT_GT(table.bytes(), before);
+    before = table.bytes();
+    // Rows for wo and for six sharpnesses of twice as many axes, times the ranks.
+    std::size_t rank = 0;
+    for (const int r : table.ranks()) rank += static_cast<std::size_t>(r);
+    EXPECT_EQ(table.bytes(), 4 * rank * (12 * 6 + 6 * 12 * 12));
+  }
+}
+
+}  // namespace
+}  // namespace heddle
