@@ -258,7 +258,7 @@ void FabricStages::run_shard(const Stage& stage, Work&& work) {
 // Maps do not depend on [visibility], which says how they are compressed.
 FabricStages::Stage FabricStages::maps_stage() {
   return make_stage(
-      "maps", 2, ".safetensors", "",
+      "maps", 3, ".safetensors", "",
       {{"geometry", geometry_key()}, {"light_from", light_from()}, {"seed", fmt::format("{}", document_.config.seed)}});
 }
 
@@ -331,7 +331,7 @@ TransferSettings FabricStages::transfer_settings(std::optional<int> order) const
 }
 
 FabricStages::Stage FabricStages::transfer_stage(const TransferSettings& settings) {
-  return make_stage("transfer", 2, ".safetensors", document_.transfer_text,
+  return make_stage("transfer", 3, ".safetensors", document_.transfer_text,
                     {{"fibers", synth().key},
                      {"order", fmt::format("{}", settings.order)},
                      {"light_from", light_from()},

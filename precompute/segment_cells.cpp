@@ -51,7 +51,8 @@ SegmentCells make_segment_cells(const Exemplar& exemplar, const SegmentOrigins& 
   for (std::uint32_t s = 0; s < segments; ++s) {
     const Vec3d middle = exemplar.segment_midpoint(s).cast<double>();
     const Vec3d side = (origins.position[s].cast<double>() - middle) / exemplar.radius_mm[exemplar.segment_fiber[s]];
-    features[s] << middle, kSideScale * static_cast<double>(edge_mm) * side;
+    features[s].head<3>() = middle;
+    features[s].tail<3>() = kSideScale * static_cast<double>(edge_mm) * side;
   }
   std::vector<std::uint32_t> order(segments);
   std::iota(order.begin(), order.end(), 0U);
