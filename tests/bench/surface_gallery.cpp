@@ -85,8 +85,8 @@ struct Page {
 
 void write_label(Page& page, int left, int top, const std::string& text) {
   for (const char letter : text) {
-    const auto glyph =
-        std::find_if(kGlyphs.begin(), kGlyphs.end(), [&](const Glyph& candidate) { return candidate.letter == letter; });
+    const auto glyph = std::find_if(kGlyphs.begin(), kGlyphs.end(),
+                                    [&](const Glyph& candidate) { return candidate.letter == letter; });
     const int first = top + (kDescending.find(letter) == std::string_view::npos ? 0 : 2);
     for (int y = 0; glyph != kGlyphs.end() && y < 7; ++y) {
       for (int x = 0; x < 5; ++x) {
@@ -105,8 +105,8 @@ std::vector<std::uint8_t> picture_of(SceneConfig config, const std::shared_ptr<c
   PrecomputedSettings settings;
   settings.seed = config.seed;
   const PrecomputedRenderer renderer(scene, {}, config.lights, config.background, settings);
-  const FrameBuffers frame = shade_picture(renderer, Camera(view.camera),
-                                           {0, 0, view.camera.width, view.camera.height}, view.spp, [](double) {});
+  const FrameBuffers frame = shade_picture(renderer, Camera(view.camera), {0, 0, view.camera.width, view.camera.height},
+                                           view.spp, [](double) {});
   return tone_map(frame.beauty, 0);
 }
 
@@ -124,7 +124,8 @@ void draw_page(const std::string& scene_file, const std::string& page_file, int 
     const int top = k / columns * height;
     const std::vector<std::uint8_t> picture = picture_of(config, read_surface_model(surface_preset(names[k])));
     for (int y = 0; y < height - kLabelHeight; ++y) {
-      std::copy_n(&picture[static_cast<std::size_t>(3 * y * width)], 3 * width, page.pixel(left, top + kLabelHeight + y));
+      std::copy_n(&picture[static_cast<std::size_t>(3 * y * width)], 3 * width,
+                  page.pixel(left, top + kLabelHeight + y));
     }
     write_label(page, left + 6, top + 4, names[k]);
     std::cout << names[k] << '\n';

@@ -139,10 +139,10 @@ TEST(SurfaceClothLaw, AFlatPatchUnderADirectionalLightIsTheModel) {
       const EyeRay ray = ray_to({0.3, -0.7, 0}, from);
       RandomStream random(1, RandomStage::kTest, 0, 0);
       const EyeSample sample = world.tracer().trace(ray, random);
-      const Rgb expected = light.irradiance * model
-                                                  ->reflected({Vec2(0.3F, -0.7F), 0}, light.axis.cast<double>(),
-                                                              -ray.direction.cast<double>())
-                                                  .cast<float>();
+      const Rgb expected =
+          light.irradiance *
+          model->reflected({Vec2(0.3F, -0.7F), 0}, light.axis.cast<double>(), -ray.direction.cast<double>())
+              .cast<float>();
       EXPECT_GT(expected.minCoeff(), 0);
       EXPECT_TRUE((sample.single == expected).all()) << name << ": " << (sample.single / expected).transpose();
       EXPECT_TRUE((sample.multiple == 0).all());
@@ -162,7 +162,8 @@ TEST(SurfaceClothStatistical, EstimatorsAgreeWithEachOtherAndWithTheLightsIntegr
       const Light light = gaussian({0.5F, 0.1F, 1}, sharpness, Rgb(1, 1, 1));
       const World world = surface_world(model, flat_cloth(4, 4), {light});
       const EyeRay ray = ray_to({0, 0, 0}, {-0.4F, 0.3F, 1});
-      const Rgbd exact = model->reflected_sg({}, light.axis.cast<double>(), light.sharpness, -ray.direction.cast<double>());
+      const Rgbd exact =
+          model->reflected_sg({}, light.axis.cast<double>(), light.sharpness, -ray.direction.cast<double>());
       for (const LightEstimator estimator :
            {LightEstimator::kShadowRays, LightEstimator::kEscapes, LightEstimator::kCombined}) {
         const PathTracer tracer = world.tracer(estimator);
@@ -226,7 +227,7 @@ TEST(SurfaceCloth, ShearedUvsLeaveTheFrameOrthonormal) {
   Eigen::Matrix2d shear;
   shear << 1, 0.7, 0, 2;
   const SurfaceHit hit = seen(mapped(shear), {0.5, 0.25, 0}, {0, 0, 1});
-  EXPECT_LT((hit.world_from_patch - Mat3d::Identity()).norm(), 1e-12);  // u grows fastest elsewhere, but v stays along x
+  EXPECT_LT((hit.world_from_patch - Mat3d::Identity()).norm(), 1e-12);  // v stays the same along x
   EXPECT_NEAR(hit.point.position_mm.x(), 0.5 + 0.7 * 0.25, 1e-6);
   EXPECT_NEAR(hit.point.position_mm.y(), 0.5, 1e-6);
 }
@@ -252,7 +253,8 @@ TEST(SurfaceCloth, CurvedClothHasInterpolatedNormals) {
 TEST(SurfaceCloth, NoBlackRimWhereNormalsTurnAwayFromTheEye) {
   // Four steps of 22.5 degrees; the last one rises 33.75 degrees to an eye 38 degrees high, its rim's normal falls to it.
   const double last = radians(33.75);
-  const Vec3d middle(0.1, 2 * std::cos(radians(11.25)) * std::sin(last), 2 * std::cos(radians(11.25)) * std::cos(last) - 2);
+  const Vec3d middle(0.1, 2 * std::cos(radians(11.25)) * std::sin(last),
+                     2 * std::cos(radians(11.25)) * std::cos(last) - 2);
   const Vec3 from(0, -static_cast<float>(std::cos(radians(38))), static_cast<float>(std::sin(radians(38))));
   const World world = surface_world(constant_model(), arch(4), {directional(from)});
   int bent = 0;
@@ -273,8 +275,8 @@ TEST(SurfaceCloth, NoBlackRimWhereNormalsTurnAwayFromTheEye) {
 }
 
 TEST(SurfaceCloth, TheBackShowsTheModelUnderLightFromBelow) {
-  const World world =
-      surface_world(constant_model(), flat_cloth(4, 4), {directional({0, 0.2F, 1}), directional({0.1F, 0, -1}, Rgb(7, 7, 7))});
+  const World world = surface_world(constant_model(), flat_cloth(4, 4),
+                                    {directional({0, 0.2F, 1}), directional({0.1F, 0, -1}, Rgb(7, 7, 7))});
   RandomStream random(1, RandomStage::kTest, 0, 0);
   EXPECT_TRUE((world.tracer().trace(ray_to({0.3, 0, 0}, {0, 0, 1}), random).single == Rgb(1, 1, 0.75F)).all());
   EXPECT_TRUE((world.tracer().trace(ray_to({0.3, 0, 0}, {0, 0, -1}), random).single == Rgb(7, 3.5F, 1.75F)).all());
@@ -321,10 +323,10 @@ TEST(SurfaceCloth, MeshesAndSurfacesShadowASurface) {
   TriangleMesh roof{{Vec3(0, -5, 1), Vec3(5, -5, 1), Vec3(5, 5, 1), Vec3(0, 5, 1)}, {{0, 1, 2}, {0, 2, 3}}};
   const Light light = directional({0, 0, 1});
   const World mesh = make_world({}, {roof}, {SurfaceCloth(constant_model(), flat_cloth(4, 4))}, {light});
-  const World surface = make_world({}, {},
-                                   {SurfaceCloth(constant_model(), lifted(flat_cloth(1, 1), 1)),
-                                    SurfaceCloth(constant_model(), flat_cloth(4, 4))},
-                                   {light});
+  const World surface = make_world(
+      {}, {},
+      {SurfaceCloth(constant_model(), lifted(flat_cloth(1, 1), 1)), SurfaceCloth(constant_model(), flat_cloth(4, 4))},
+      {light});
   const auto lit = [](const World& world, double x) {
     RandomStream random(1, RandomStage::kTest, 0, 0);
     return world.tracer().trace(ray_to({x, 0, 0}, {-1, 0, 0.3F}), random).single[0];
@@ -335,11 +337,29 @@ TEST(SurfaceCloth, MeshesAndSurfacesShadowASurface) {
   EXPECT_EQ(lit(surface, 0.2), 0);
 }
 
+TEST(SurfaceCloth, ARoofTakesAllOfAGaussianLight) {
+  const TriangleMesh roof{{Vec3(-9e3F, -9e3F, 1), Vec3(9e3F, -9e3F, 1), Vec3(0, 9e3F, 1)}, {{0, 1, 2}}};
+  for (const bool covered : {false, true}) {
+    const World world = make_world({}, covered ? std::vector{roof} : std::vector<TriangleMesh>{},
+                                   {SurfaceCloth(constant_model(), flat_cloth(4, 4))}, {gaussian({0, 0, 1}, 8)});
+    for (const LightEstimator estimator :
+         {LightEstimator::kShadowRays, LightEstimator::kEscapes, LightEstimator::kCombined}) {
+      float sum = 0;
+      for (int k = 0; k < 100; ++k) {
+        RandomStream random(1, RandomStage::kTest, 0, static_cast<std::uint64_t>(k));
+        sum += world.tracer(estimator).trace(ray_to({0, 0, 0}, {-1, 0, 0.3F}), random).single[0];
+      }
+      EXPECT_EQ(sum > 0, !covered);
+    }
+  }
+}
+
 TEST(SurfaceCloth, FibersShadowASurface) {
   // Fibers of radius 0.05 over x = -0.5 and 0.5. Traced fibers shade what lies under them; as a solid the shell shades all.
   const auto sparse = std::make_shared<TileScene>(single_fiber(test_cotton()));
-  const World world = make_world({{sparse, lifted(flat_cloth(2, 2), 1)}}, {},
-                                 {SurfaceCloth(constant_model(), flat_cloth(8, 8))}, {directional({0, 0, 1}, Rgb(1, 1, 1))});
+  const World world =
+      make_world({{sparse, lifted(flat_cloth(2, 2), 1)}}, {}, {SurfaceCloth(constant_model(), flat_cloth(8, 8))},
+                 {directional({0, 0, 1}, Rgb(1, 1, 1))});
   const PathTracer tracer = world.tracer();
   for (int k = -35; k < 36; ++k) {
     RandomStream random(1, RandomStage::kTest, 0, 0);
@@ -358,8 +378,8 @@ TEST(SurfaceCloth, ASurfaceShadowsFibersAndTheNearerHidesTheOther) {
   // The surface hangs over x > 0 of the fibers.
   ClothMesh half = lifted(flat_cloth(4, 4), 1);
   for (Vec3d& position : half.positions) position.x() += 2;
-  const World world = make_world({{tile, flat_cloth(6, 4)}}, {}, {SurfaceCloth(constant_model(), half)},
-                                 {directional({0, 0, 1})});
+  const World world =
+      make_world({{tile, flat_cloth(6, 4)}}, {}, {SurfaceCloth(constant_model(), half)}, {directional({0, 0, 1})});
   const PathTracer tracer = world.tracer();
   const auto mean = [&](double x, const Vec3& from) {
     RunningMean total;
@@ -390,7 +410,8 @@ TEST(SurfaceClothEndToEnd, SameBytesForAnyThreadsAndCrop) {
   const auto two = pictures(2, {0, 0, 32, 32});
   const auto crop = pictures(2, {5, 9, 20, 11});
   double light = 0;
-  for (const auto picture : {&std::pair<FrameBuffers, FrameBuffers>::first, &std::pair<FrameBuffers, FrameBuffers>::second}) {
+  for (const auto picture :
+       {&std::pair<FrameBuffers, FrameBuffers>::first, &std::pair<FrameBuffers, FrameBuffers>::second}) {
     for (std::size_t k = 0; k < (one.*picture).pixel_count(); ++k) {
       ASSERT_TRUE(((one.*picture).beauty[k] == (two.*picture).beauty[k]).all());
       light += static_cast<double>((one.*picture).beauty[k].sum());
