@@ -2,6 +2,7 @@
 // surfaces, side by side with their names.
 //
 //   heddle_surface_gallery configs/scenes/surface-gallery.toml docs/surface-models.png [--columns N] [--spp N]
+// 22 fabrics at 32 samples per pixel take some four minutes of one core.
 
 #include <fmt/format.h>
 
@@ -140,7 +141,7 @@ int main(int argc, char** argv) {
   CLI::App app("One page of pictures of all surface fabrics");
   std::string scene;
   std::string page;
-  int columns = 3;
+  int columns = 4;
   int spp = 0;
   app.add_option("scene", scene, "scene whose cloths take each surface in turn")->required()->check(CLI::ExistingFile);
   app.add_option("page", page, "PNG to write")->required();
