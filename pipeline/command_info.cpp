@@ -58,6 +58,11 @@ Report describe_fabric(const fs::path& path, const CommonOptions& common) {
   return report;
 }
 
+Report describe_surface_fabric(const TomlTable& document) {
+  read_surface_model(document);  // says what is wrong with it
+  return {{"kind", "surface fabric config"}, {"model", document.string("model")}};
+}
+
 Report describe_scene(const TomlTable& document) {
   const SceneConfig scene = read_scene_config(document);
   Report report = {{"kind", "scene config"}, {"name", scene.name}};
@@ -69,7 +74,7 @@ Report describe_scene(const TomlTable& document) {
   report["method"] = render_method_name(scene.method);
   report["lights"] = scene.lights.size();
   Report fabrics = Report::array();
-  for (const ClothConfig& cloth : scene.cloths) fabrics.push_back(cloth.fabric.string());
+  for (const ClothConfig& cloth : scene.cloths) fabrics.push_back(cloth.surface ? cloth.surface->name : cloth.fabric.string());
   report["fabrics"] = fabrics;
   return report;
 }
@@ -222,6 +227,7 @@ Report describe(const fs::path& path, const CommonOptions& common) {
   const std::string extension = path.extension().string();
   if (extension == ".toml") {
     const TomlTable document = TomlTable::load(path);
+    if (document.has("model")) return describe_surface_fabric(document);
     return document.has("weave") ? describe_fabric(path, common) : describe_scene(document);
   }
   if (extension == ".safetensors") return describe_tensors(path, common);

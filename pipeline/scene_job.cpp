@@ -74,6 +74,7 @@ SceneJob::SceneJob(const fs::path& scene_file, StageContext& context, std::optio
   for (const char* key : {"name", "camera", "view", "render"}) text.erase(key);
   scene_text_ = text.dump();
   for (const ClothConfig& cloth : config_.cloths) {
+    if (cloth.surface) continue;
     auto& stages = fabrics_[cloth.fabric];
     if (!stages) stages = std::make_unique<FabricStages>(cloth.fabric, context);
   }
@@ -120,6 +121,7 @@ std::string SceneJob::picture_key(const PictureRequest& request) {
   for (const Artifact& pack : packs_for(request.method)) values.emplace_back("pack", pack.key);
   for (const ClothConfig& cloth : config_.cloths) {
     if (cloth.mesh) values.emplace_back("mesh", content_hash_of_file(cloth.mesh->path));
+    if (cloth.surface) values.emplace_back("surface", cloth.surface->text);
   }
   for (const MeshFile& mesh : config_.meshes) values.emplace_back("mesh", content_hash_of_file(mesh.path));
   return stage_key(inputs);
@@ -136,7 +138,9 @@ const SceneJob::Loaded& SceneJob::loaded_for(RenderMethod method) {
     loaded->tiles[file] = std::make_shared<const TileScene>(loaded->packs.at(file).exemplar);
   }
   std::vector<std::shared_ptr<const TileScene>> tiles;
-  for (const ClothConfig& cloth : config_.cloths) tiles.push_back(loaded->tiles.at(cloth.fabric));
+  for (const ClothConfig& cloth : config_.cloths) {
+    if (!cloth.surface) tiles.push_back(loaded->tiles.at(cloth.fabric));
+  }
   loaded->scene.reset(new ClothScene(make_cloth_scene(config_, tiles)));  // cannot be moved: built in place
   return *loaded;
 }
@@ -168,7 +172,9 @@ PictureResult SceneJob::render(const PictureRequest& request, const std::string&
     frame = trace_picture(tracer, camera, request.crop, request.seed, {request.spp, request.seconds}, report_progress);
   } else {
     std::vector<const FabricPack*> packs;
-    for (const ClothConfig& cloth : config_.cloths) packs.push_back(&loaded.packs.at(cloth.fabric));
+    for (const ClothConfig& cloth : config_.cloths) {
+      if (!cloth.surface) packs.push_back(&loaded.packs.at(cloth.fabric));
+    }
     const PrecomputedSettings settings{.seed = request.seed,
                                        .volume = request.method == RenderMethod::kVolume,
                                        .shadow_sigma_mm = config_.shadow_sigma_mm};

@@ -66,6 +66,7 @@ std::string hash_of_geometry(const Exemplar& exemplar) {
 
 FabricDocument read_fabric_document(const fs::path& path, std::optional<std::uint64_t> seed) {
   const TomlTable document = TomlTable::load(path);
+  if (document.has("model")) document.fail("model", "this fabric has no fibers: a scene names it by the key surface");
   FabricDocument fabric;
   fabric.file = path;
   fabric.config = read_fabric_config(document);

@@ -21,7 +21,8 @@ Camera::Camera(const CameraConfig& config)
 EyeRay Camera::ray(double x, double y) const {
   const double across = (2.0 * x / width_ - 1.0) * tan_x_;
   const double above = (1.0 - 2.0 * y / height_) * tan_y_;
-  return {position_, (forward_ + across * right_ + above * up_).normalized().cast<float>()};
+  const Vec3d direction = (forward_ + across * right_ + above * up_).normalized();
+  return {position_, direction.cast<float>(), pixel_size(direction.dot(forward_))};
 }
 
 std::string Camera::world_to_camera_text() const {

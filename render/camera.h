@@ -32,7 +32,8 @@ struct PixelRect {
 
 struct EyeRay {
   Vec3d origin;
-  Vec3 direction;  // unit
+  Vec3 direction;     // unit
+  double spread = 0;  // edge of the pixel's footprint, mm per mm along the ray
 };
 
 class Camera {

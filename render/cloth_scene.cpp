@@ -12,7 +12,7 @@ namespace {
 constexpr double kShellMargin = 1e-3;
 // Distance of an underlay from the shell, in thicknesses.
 constexpr double kUnderlayGap = 1e-2;
-// Start of global shadow rays above the shell: some 30 times the rounding of a float at 300 mm.
+// Start of shadow rays above a shell or a mesh: some 30 times the rounding of a float at 300 mm.
 constexpr double kLiftMm = 1e-3;
 
 double thickness(const Exemplar& exemplar) {
@@ -42,7 +42,8 @@ std::vector<TriangleMesh> ClothScene::boundaries(const std::vector<Cloth>& cloth
   return meshes;
 }
 
-ClothScene::ClothScene(std::vector<ClothPiece> pieces, std::vector<TriangleMesh> black_meshes)
+ClothScene::ClothScene(std::vector<ClothPiece> pieces, std::vector<TriangleMesh> black_meshes,
+                       std::vector<SurfaceCloth> surfaces)
     : cloths_([&] {
         std::vector<Cloth> cloths;
         std::map<const TileScene*, std::uint16_t> offsets;
@@ -61,11 +62,25 @@ ClothScene::ClothScene(std::vector<ClothPiece> pieces, std::vector<TriangleMesh>
         return cloths;
       }()),
       boundary_(boundaries(cloths_)),
-      black_(black_meshes) {}
+      surfaces_(std::move(surfaces)),
+      meshes_([&] {
+        std::vector<TriangleMesh> meshes;
+        for (const SurfaceCloth& surface : surfaces_) meshes.push_back(surface.triangle_mesh());
+        meshes.insert(meshes.end(), black_meshes.begin(), black_meshes.end());
+        return meshes;
+      }()) {}
+
+std::optional<MeshHit> ClothScene::first_mesh(const Vec3d& origin, const Vec3& direction, double t_max) const {
+  const std::optional<TriangleScene::Hit> hit =
+      meshes_.intersect(origin.cast<float>(), direction, static_cast<float>(t_max));
+  if (!hit) return {};
+  const SurfaceCloth* surface = hit->mesh < surfaces_.size() ? &surfaces_[hit->mesh] : nullptr;
+  return MeshHit{static_cast<double>(hit->t), surface, hit->triangle, hit->u, hit->v};
+}
 
 bool ClothScene::occluded(const SceneRay& ray) const {
   // Meshes first: a ray through them costs a quarter of one through fibers.
-  if (meets_black(ray.origin, ray.direction, ray.t_max)) return true;
+  if (meets_mesh(ray.origin, ray.direction, ray.t_max)) return true;
   bool is_blocked = false;
   double limit = ray.t_max;
   walk(ray, RayReach::kEverything, limit,
@@ -82,7 +97,11 @@ bool ClothScene::occluded(const SceneRay& ray) const {
 
 bool ClothScene::globally_visible(const Shell::SurfacePoint& point, const Vec3& direction) const {
   const Vec3 origin = (point.position + kLiftMm * point.normal).cast<float>();
-  return !boundary_.occluded(origin, direction) && !black_.occluded(origin, direction);
+  return !boundary_.occluded(origin, direction) && !meshes_.occluded(origin, direction);
+}
+
+bool ClothScene::visible(const Shell::SurfacePoint& point, const Vec3& direction) const {
+  return !occluded({point.position + kLiftMm * point.normal, direction});
 }
 
 ClothScene::LocalRay ClothScene::local_ray(const ShellInterval& interval, const Exemplar& exemplar,
@@ -114,18 +133,21 @@ std::uint32_t ClothScene::degenerate_tets() const {
 ClothScene make_cloth_scene(const SceneConfig& config,
                             std::span<const std::shared_ptr<const TileScene>> tiles) {
   std::vector<ClothPiece> pieces;
-  for (std::size_t k = 0; k < config.cloths.size(); ++k) {
-    const ClothConfig& cloth = config.cloths[k];
-    pieces.push_back({tiles[k],
-                      cloth.mesh ? cloth_mesh_of(read_obj(cloth.mesh->path), cloth.mesh->path.string(),
-                                                 cloth.mesh->mm_per_unit, cloth.uv_size_mm)
-                                 : flat_cloth(cloth.flat_width_mm, cloth.flat_height_mm),
-                      cloth.underlay});
+  std::vector<SurfaceCloth> surfaces;
+  for (const ClothConfig& cloth : config.cloths) {
+    ClothMesh mesh = cloth.mesh ? cloth_mesh_of(read_obj(cloth.mesh->path), cloth.mesh->path.string(),
+                                                cloth.mesh->mm_per_unit, cloth.uv_size_mm)
+                                : flat_cloth(cloth.flat_width_mm, cloth.flat_height_mm);
+    if (cloth.surface) {
+      surfaces.emplace_back(cloth.surface->model, std::move(mesh));
+    } else {
+      pieces.push_back({tiles[pieces.size()], std::move(mesh), cloth.underlay});
+    }
   }
   std::vector<TriangleMesh> black;
   for (const MeshFile& mesh : config.meshes)
     black.push_back(scaled_mesh(read_obj(mesh.path), mesh.mm_per_unit));
-  return {std::move(pieces), std::move(black)};
+  return {std::move(pieces), std::move(black), std::move(surfaces)};
 }
 
 }  // namespace heddle

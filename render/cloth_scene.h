@@ -1,8 +1,8 @@
 #ifndef HEDDLE_RENDER_CLOTH_SCENE_H_
 #define HEDDLE_RENDER_CLOTH_SCENE_H_
-// All cloth and all black meshes of a scene in world space (millimetres): rays through the shell maps against
-// the explicit fibers (or whatever a query finds in fabric space), and macroscopic visibility against shells
-// and meshes.
+// All cloth and all meshes of a scene in world space (millimetres): rays through the shell maps against the
+// explicit fibers (or whatever a query finds in fabric space), and macroscopic visibility against shells and
+// meshes. Meshes are surface cloths and black meshes; fibers see both as black.
 //
 // Shells may overlap in space; a ray visits all of them. Only a ray that starts inside one shell does not see
 // what another shell holds around its very origin. Fabric coordinates are folded into the base tile in double
@@ -21,6 +21,7 @@
 #include "fibers/tracing/tile_scene.h"
 #include "render/scene_config.h"
 #include "render/shell.h"
+#include "render/surface_cloth.h"
 #include "render/triangle_scene.h"
 
 namespace heddle {
@@ -42,6 +43,14 @@ struct ShellHit {
   Vec3d fabric;    // fabric space, not folded into the tile
 };
 
+/// A point on a mesh.
+struct MeshHit {
+  double t;                     // mm along the ray
+  const SurfaceCloth* surface;  // null: a black mesh
+  std::uint32_t triangle;
+  float u, v;  // as in TriangleScene::Hit
+};
+
 /// A ray through the scene; direction of unit length. It may start at a hit, whose fiber it then ignores
 /// until it has left that shell.
 struct SceneRay {
@@ -59,8 +68,10 @@ enum class RayReach : std::uint8_t {
 
 class ClothScene {
  public:
-  ClothScene(std::vector<ClothPiece> pieces, std::vector<TriangleMesh> black_meshes);
+  ClothScene(std::vector<ClothPiece> pieces, std::vector<TriangleMesh> black_meshes,
+             std::vector<SurfaceCloth> surfaces = {});
 
+  /// Pieces of fibers; all that `cloth` counts below.
   std::size_t cloth_count() const { return cloths_.size(); }
   const Shell& shell(std::uint32_t cloth) const { return cloths_[cloth].shell; }
   const TileScene& tile(std::uint32_t cloth) const { return *cloths_[cloth].tile; }
@@ -81,20 +92,21 @@ class ClothScene {
       return cloths_[cloth].tile->intersect(local, own_fiber);
     });
   }
-  /// Does the ray meet a fiber or a black mesh?
+  /// Does the ray meet a fiber or a mesh?
   bool occluded(const SceneRay& ray) const;
 
-  /// Does the ray meet a black mesh in (0, t_max]?
-  bool meets_black(const Vec3d& origin, const Vec3& direction, double t_max) const {
-    return black_.occluded(origin.cast<float>(), direction, static_cast<float>(t_max));
+  /// Does the ray meet a mesh in (0, t_max]?
+  bool meets_mesh(const Vec3d& origin, const Vec3& direction, double t_max) const {
+    return meshes_.occluded(origin.cast<float>(), direction, static_cast<float>(t_max));
   }
-  /// Distance to the first black mesh.
-  std::optional<float> first_black(const Vec3d& origin, const Vec3& direction) const {
-    return black_.intersect(origin.cast<float>(), direction);
-  }
+  /// The first mesh in (0, t_max].
+  std::optional<MeshHit> first_mesh(const Vec3d& origin, const Vec3& direction,
+                                    double t_max = std::numeric_limits<double>::infinity()) const;
 
-  /// Is a point of a shell's surface open towards `direction`, past all shells (as solids) and black meshes?
+  /// Is a point of a shell's surface, or of a mesh, open towards `direction`, past all shells (as solids) and meshes?
   bool globally_visible(const Shell::SurfacePoint& point, const Vec3& direction) const;
+  /// The same past all fibers and meshes.
+  bool visible(const Shell::SurfacePoint& point, const Vec3& direction) const;
 
   /// Surface point of the shell straight over (kFace) or under (kBack) a hit.
   Shell::SurfacePoint surface_point(const ShellHit& hit, ClothSide side) const {
@@ -153,11 +165,12 @@ class ClothScene {
   std::vector<FiberScattering> materials_;
   std::vector<Cloth> cloths_;
   TriangleScene boundary_;  // mesh index = cloth
-  TriangleScene black_;
+  std::vector<SurfaceCloth> surfaces_;
+  TriangleScene meshes_;    // the surfaces, then the black meshes
   mutable std::atomic<std::uint64_t> failed_walks_ = 0;
 };
 
-/// The scene of a config. tiles: [cloth].
+/// The scene of a config. tiles: [cloth that has a fabric].
 ClothScene make_cloth_scene(const SceneConfig& config,
                             std::span<const std::shared_ptr<const TileScene>> tiles);
 

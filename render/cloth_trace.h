@@ -3,7 +3,7 @@
 // Shell-mapped cloth as a Trace for walk_path; directions and tangents are world space.
 //
 // A scattered ray ignores its own fiber until it has left the shell it starts in; then it may enter this
-// shell again or another. A path that may not go on ends at a vertex with `is_end` set: on a black mesh, or
+// shell again or another. A path that may not go on ends at a vertex with `is_end` set: on a mesh, or
 // (local) where it would meet cloth again after leaving its shell. So a path escapes where, and only where,
 // its last ray is not occluded: light found by escaping and light found by shadow rays are the same integral.
 // Tested in tests/render/cloth_trace_test.cpp.
@@ -38,8 +38,8 @@ class ClothTrace {
     const SceneRay ray{from.hit.position, direction, &from.hit};
     const std::optional<ShellHit> hit =
         scene_->first_fiber(ray, local_ ? RayReach::kOwnShell : RayReach::kEverything);
-    // The cloth first: most hits are near, and leave little to search for black meshes.
-    if (!scene_->meets_black(ray.origin, direction, hit ? hit->t : ray.t_max)) {
+    // The cloth first: most hits are near, and leave little to search for meshes.
+    if (!scene_->meets_mesh(ray.origin, direction, hit ? hit->t : ray.t_max)) {
       if (hit) return vertex(*hit);
       if (!local_ || !scene_->occluded(ray)) return {};
     }

@@ -23,6 +23,10 @@ struct Light {
   bool is_directional() const { return type == LightType::kDirectional; }
 };
 
+/// How light is found: by shadow rays alone, by directions drawn from what scatters alone (which never meet a
+/// directional light), or both, weighted by the power heuristic.
+enum class LightEstimator : std::uint8_t { kShadowRays, kEscapes, kCombined };
+
 /// Radiance from `direction`; 0 for directional lights, which no direction drawn otherwise can meet.
 Rgb light_radiance(const Light& light, const Vec3& direction);
 

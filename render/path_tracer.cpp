@@ -8,17 +8,9 @@
 #include <chrono>
 #include <cmath>
 
+#include "fibers/math/sampling.h"
+
 namespace heddle {
-
-namespace {
-
-// Power heuristic with exponent 2, written so that neither square can overflow.
-float power_heuristic(float chosen, float other) {
-  const float ratio = other / chosen;
-  return 1.0F / (1.0F + ratio * ratio);
-}
-
-}  // namespace
 
 PathTracer::PathTracer(const ClothScene& scene, std::span<const BcsdfTable> materials,
                        std::span<const Light> lights, const Rgb& background,
@@ -73,8 +65,14 @@ PathTracer::Sample PathTracer::trace(const EyeRay& ray, RandomStream& random) co
   const SceneRay scene_ray{ray.origin, ray.direction};
   const std::optional<ShellHit> hit = scene_->first_fiber(scene_ray);
   Sample sample;
-  if (scene_->meets_black(ray.origin, ray.direction, hit ? hit->t : scene_ray.t_max)) {
+  if (const auto mesh = scene_->first_mesh(ray.origin, ray.direction, hit ? hit->t : scene_ray.t_max)) {
     sample.alpha = 1;
+    if (mesh->surface == nullptr) return sample;
+    const SurfaceHit surface =
+        mesh->surface->hit(mesh->triangle, mesh->u, mesh->v, ray.direction, ray.spread * mesh->t);
+    sample.single = surface_direct_light(
+        surface, -ray.direction, lights_, settings_.estimator, random,
+        [&](const Vec3& direction) { return scene_->visible({surface.position, surface.normal}, direction); });
   } else if (hit) {
     sample = radiance(trace_.vertex(*hit), -ray.direction, random);
     sample.alpha = 1;

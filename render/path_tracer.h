@@ -5,7 +5,7 @@
 // the power heuristic (Veach 1997). `single` is light scattered once, `multiple` the rest.
 //
 // Local pictures (paths end where they leave the shell) keep the shadows of all cloth and meshes: what the
-// precomputed methods claim to match. Random numbers are addressed by (seed, pixel of the full frame, sample)
+// precomputed methods claim to match. Surface cloths are lit directly, past the fibers (surface_cloth.h). Random numbers are addressed by (seed, pixel of the full frame, sample)
 // and sums run in sample order, so a picture depends neither on threads nor on the crop. Tested in
 // tests/render/path_tracer_test.cpp.
 
@@ -26,10 +26,6 @@
 #include "render/render_output.h"
 
 namespace heddle {
-
-/// How light is found: by shadow rays alone, by escaping paths alone (which never meet a directional light),
-/// or both.
-enum class LightEstimator : std::uint8_t { kShadowRays, kEscapes, kCombined };
 
 struct PathTracerSettings {
   std::uint64_t seed = 1;

@@ -107,6 +107,12 @@ PrecomputedRenderer::GlobalVisibility PrecomputedRenderer::global_visibility(con
   return result;
 }
 
+Rgb PrecomputedRenderer::surface_light(const SurfaceHit& hit, const Vec3& wo, RandomStream& random) const {
+  return surface_direct_light(hit, wo, lights_, LightEstimator::kCombined, random, [&](const Vec3& direction) {
+    return scene_->globally_visible({hit.position, hit.normal}, direction);
+  });
+}
+
 void PrecomputedRenderer::shade(const Camera& camera, const PixelRect& block, int first, int last,
                                 std::vector<Sample>& samples, std::vector<std::optional<Seen>>& seen) const {
   const int pixels = block.width * block.height;
@@ -131,12 +137,23 @@ void PrecomputedRenderer::shade(const Camera& camera, const PixelRect& block, in
     const double y = block.y0 + pixel / block.width + eye.uniform_double();
     const EyeRay ray = camera.ray(x, y);
     SceneRay scene_ray{ray.origin, ray.direction};
-    const std::optional<float> black = scene_->first_black(ray.origin, ray.direction);
-    if (black) scene_ray.t_max = static_cast<double>(*black);
+    const std::optional<MeshHit> mesh = scene_->first_mesh(ray.origin, ray.direction);
+    if (mesh) scene_ray.t_max = mesh->t;
     const std::optional<ShellHit> hit = eye_hit(scene_ray);
-    samples[i].alpha = hit || black ? 1.0F : 0.0F;
+    samples[i].alpha = hit || mesh ? 1.0F : 0.0F;
+    if (!hit && mesh && mesh->surface != nullptr) {
+      const SurfaceHit surface =
+          mesh->surface->hit(mesh->triangle, mesh->u, mesh->v, ray.direction, ray.spread * mesh->t);
+      RandomStream random(settings_.seed, RandomStage::kLightVisibility, address(pixel), static_cast<std::uint64_t>(s));
+      samples[i].single = surface_light(surface, -ray.direction, random);
+      const Vec2& place = surface.point.position_mm;
+      if (s == 0) {
+        seen[pixel] = Seen{Seen::kNone, Seen::kNone, surface.position, Vec3d(place.x(), place.y(), 0),
+                           surface.world_from_patch.col(0).cast<float>()};
+      }
+    }
     if (!hit) {
-      if (!black) samples[i].background = background_;
+      if (!mesh) samples[i].background = background_;
       continue;
     }
     const FabricPack& pack = *cloths_[hit->cloth].pack;
@@ -211,8 +228,8 @@ FrameBuffers shade_picture(const PrecomputedRenderer& renderer, const Camera& ca
   FrameBuffers frame(crop.width, crop.height);
   frame.spp = spp;
   const std::size_t count = frame.pixel_count();
-  frame.segment.assign(count, 0xffffffffU);
-  frame.cell.assign(count, 0xffffffffU);
+  frame.segment.assign(count, PrecomputedRenderer::Seen::kNone);
+  frame.cell.assign(count, PrecomputedRenderer::Seen::kNone);
   frame.fabric_position.assign(count, Vec3::Zero());
   frame.depth.assign(count, 0.0F);
   frame.tangent.assign(count, Vec3::Zero());

@@ -4,13 +4,14 @@
 // Per block of pixels and samples:
 //   1. G-buffer: cloth, segment, cell, frames and fabric position of every sample, by rays against the fibers or through
 //      the id volume;
-//   2. light visibility: a shadow ray against the shells and the black meshes from the shell's surface straight above the
+//   2. light visibility: a shadow ray against the shells and the meshes from the shell's surface straight above the
 //      hit (below it where the light is under the cloth), for single scattering; another from a point moved along the cloth
 //      by a 2D Gaussian, whose mean is the smoothed visibility of multiple scattering. For a spherical Gaussian the ray
 //      goes in a direction drawn from the light (the mean is a soft shadow); where the fabric takes light from its face
 //      only, from that part of the light that lies on the face's side, since the precomputed data hold no other light;
 //   3. shading, sorted by cell and tetrahedron: single_scattering.h, multiple_scattering.h. Incoming fields of all lights
 //      are summed before they are turned and scattered, and are kept while cell and light direction stay the same.
+// Surface cloths are lit directly, at once, with shadows of the same shells and meshes (surface_cloth.h).
 // What is not modelled: light between different parts of the cloth, and the shell's bend between two fibers of one cell.
 // Signs of multiple scattering are kept (see multiple_scattering.h): a dark pixel can be slightly negative.
 // Eye rays are those of the path tracer with the same seed. Random numbers are addressed by pixel of the full frame and
@@ -45,7 +46,7 @@ struct PrecomputedSettings {
 
 class PrecomputedRenderer {
  public:
-  /// packs: [cloth]; the same pack may serve several. Everything passed must outlive the renderer.
+  /// packs: [cloth of fibers]; the same pack may serve several. Everything passed must outlive the renderer.
   /// Errors: FileError where a pack lacks what the lights and settings need.
   PrecomputedRenderer(const ClothScene& scene, std::span<const FabricPack* const> packs,
                       std::span<const Light> lights, const Rgb& background,
@@ -54,8 +55,9 @@ class PrecomputedRenderer {
   using Sample = EyeSample;
   /// What the first sample of a pixel sees; empty where that is no cloth.
   struct Seen {
-    std::uint32_t segment;
-    std::uint32_t cell;
+    static constexpr std::uint32_t kNone = 0xffffffffU;
+    std::uint32_t segment;  // kNone on a surface cloth
+    std::uint32_t cell;     // kNone on a surface cloth
     Vec3d world;
     Vec3d fabric;
     Vec3 tangent;
@@ -81,6 +83,7 @@ class PrecomputedRenderer {
   };
 
   std::optional<ShellHit> eye_hit(const SceneRay& ray) const;
+  Rgb surface_light(const SurfaceHit& hit, const Vec3& wo, RandomStream& random) const;
   GlobalVisibility global_visibility(const ShellHit& hit, const Light& light, RandomStream& random) const;
 
   const ClothScene* scene_;

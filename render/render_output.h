@@ -2,7 +2,7 @@
 #define HEDDLE_RENDER_RENDER_OUTPUT_H_
 // The buffers of a picture and their form as image layers: beauty R, G, B, A; single.*, multiple.*; half0.*,
 // half1.* and Variance.* of the path tracer; of the precomputed methods segment, cell (ids, 0xffffffff =
-// none), u, v, w (fabric position of the hit, mm), Z (distance along the view direction, mm; 0 = nothing
+// none, as on surface cloths), u, v, w (fabric position of the hit, mm), Z (distance along the view direction, mm; 0 = nothing
 // hit), tangent.X/Y/Z (world). Row-major, row 0 at the top. Tested in tests/render/render_output_test.cpp.
 
 #include <cstdint>

@@ -1,7 +1,11 @@
 #include "render/scene_config.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
+
+#include "render/surface/surface_presets.h"
 
 namespace heddle {
 
@@ -119,6 +123,24 @@ MeshFile read_mesh(const TomlTable& table) {
   return mesh;
 }
 
+/// A preset's name, or a file that ends in .toml, relative to the scene's folder.
+SurfaceFabric read_surface(const TomlTable& table) {
+  const std::string name = table.string("surface");
+  const auto document = [&] {
+    if (name.ends_with(".toml")) {
+      const std::filesystem::path file = std::filesystem::path(table.document_name()).parent_path() / name;
+      if (!std::filesystem::is_regular_file(file)) table.fail("surface", "no such file: " + file.string());
+      return TomlTable::load(file);
+    }
+    const std::vector<std::string> known = surface_preset_names();
+    if (std::find(known.begin(), known.end(), name) == known.end()) {
+      table.fail("surface", fmt::format("expected a file that ends in .toml, or one of {}", fmt::join(known, ", ")));
+    }
+    return surface_preset(name);
+  }();
+  return {name, document.canonical_text(), read_surface_model(document)};
+}
+
 ClothConfig read_cloth(const TomlTable& table) {
   ClothConfig cloth;
   if (table.has("mesh") == table.has("flat_mm")) table.fail("mesh", "expected either mesh or flat_mm");
@@ -130,8 +152,13 @@ ClothConfig read_cloth(const TomlTable& table) {
     cloth.flat_width_mm = size[0];
     cloth.flat_height_mm = size[1];
   }
-  cloth.fabric = table.existing_file("fabric");
-  cloth.underlay = table.boolean("underlay", false);
+  if (table.has("fabric") == table.has("surface")) table.fail("fabric", "expected either fabric or surface");
+  if (table.has("surface")) {
+    cloth.surface = read_surface(table);
+  } else {
+    cloth.fabric = table.existing_file("fabric");
+    cloth.underlay = table.boolean("underlay", false);
+  }
   return cloth;
 }
 

@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -15,6 +16,7 @@
 #include "formats/toml_table.h"
 #include "render/camera.h"
 #include "render/lights.h"
+#include "render/surface/surface_model.h"
 
 namespace heddle {
 
@@ -29,13 +31,21 @@ struct MeshFile {
   double mm_per_unit = 1;
 };
 
+/// A cloth without fibers.
+struct SurfaceFabric {
+  std::string name;  // as the scene gives it: a preset or a file
+  std::string text;  // canonical text of its config: equal content, equal text
+  std::shared_ptr<const SurfaceModel> model;
+};
+
 struct ClothConfig {
   std::optional<MeshFile> mesh;  // an OBJ with UVs, or else a flat swatch
   double uv_size_mm = 0;         // flat cloth (mm) per unit of UV; meshes only
   double flat_width_mm = 0;      // flat swatch centred on the world's origin, z = 0; x = weft, y = warp
   double flat_height_mm = 0;
-  std::filesystem::path fabric;  // fabric TOML
-  bool underlay = false;         // a black copy of the cloth's underside just below it
+  std::filesystem::path fabric;  // fabric TOML; empty where a surface model draws the cloth
+  std::optional<SurfaceFabric> surface;
+  bool underlay = false;  // a black copy of the cloth's underside just below it; fibers only
 };
 
 /// A path-traced crop of a view, to compare the view with.

@@ -78,7 +78,8 @@ TriangleScene::~TriangleScene() {
   rtcReleaseDevice(impl_->device);
 }
 
-std::optional<float> TriangleScene::intersect(const Vec3& origin, const Vec3& direction, float t_max) const {
+std::optional<TriangleScene::Hit> TriangleScene::intersect(const Vec3& origin, const Vec3& direction,
+                                                           float t_max) const {
   if (impl_->triangle_count == 0) return {};
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
@@ -87,7 +88,7 @@ std::optional<float> TriangleScene::intersect(const Vec3& origin, const Vec3& di
   ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   rtcIntersect1(impl_->scene, &context, &ray);
   if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {};
-  return ray.ray.tfar;
+  return Hit{ray.ray.tfar, ray.hit.geomID, ray.hit.primID, ray.hit.u, ray.hit.v};
 }
 
 bool TriangleScene::occluded(const Vec3& origin, const Vec3& direction, float t_max) const {

@@ -1,7 +1,7 @@
 #ifndef HEDDLE_RENDER_TRIANGLE_SCENE_H_
 #define HEDDLE_RENDER_TRIANGLE_SCENE_H_
-// Ray queries on triangle meshes in world space (millimetres): the black meshes of a scene, and the outer
-// faces of its cloth shells. The only place that includes Embree for triangles. Float positions: good to
+// Ray queries on triangle meshes in world space (millimetres): the meshes of a scene, and the outer faces of
+// its cloth shells. The only place that includes Embree for triangles. Float positions: good to
 // about 1e-7 of their distance from the origin. Tested in tests/render/triangle_scene_test.cpp.
 
 #include <array>
@@ -29,8 +29,14 @@ class TriangleScene {
 
   static constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-  /// Distance to the first triangle in (0, t_max]; direction of unit length.
-  std::optional<float> intersect(const Vec3& origin, const Vec3& direction, float t_max = kInfinity) const;
+  struct Hit {
+    float t;
+    std::uint32_t mesh;
+    std::uint32_t triangle;
+    float u, v;  // the point is (1 - u - v) a + u b + v c of the triangle a, b, c
+  };
+  /// The first triangle in (0, t_max]; direction of unit length.
+  std::optional<Hit> intersect(const Vec3& origin, const Vec3& direction, float t_max = kInfinity) const;
   bool occluded(const Vec3& origin, const Vec3& direction, float t_max = kInfinity) const;
 
   struct Crossing {

@@ -47,6 +47,13 @@ float sample_cut_gaussian(float mean, float deviation, RandomStream& random);
 /// Share of the uncut Gaussian that lies in [-pi/2, pi/2]: the density above is the Gaussian's divided by it.
 float cut_gaussian_mass(float mean, float deviation);
 
+/// Weight of a draw by one of two samplers (Veach 1997, exponent 2): its own density and that of the other
+/// one there. Written so that neither square can overflow.
+inline float power_heuristic(float chosen, float other) {
+  const float ratio = other / chosen;
+  return 1.0F / (1.0F + ratio * ratio);
+}
+
 }  // namespace heddle
 
 #endif  // HEDDLE_FIBERS_MATH_SAMPLING_H_

@@ -309,7 +309,7 @@ void renderer_rates(const std::string& scene_file, StageContext& context) {
   const SceneConfig& config = job.config();
   std::vector<std::shared_ptr<const TileScene>> tiles;
   for (const ClothConfig& cloth : config.cloths) {
-    tiles.push_back(std::make_shared<TileScene>(synthesize(read_fabric_document(cloth.fabric, {}).config)));
+    if (!cloth.surface) tiles.push_back(std::make_shared<TileScene>(synthesize(read_fabric_document(cloth.fabric, {}).config)));
   }
   const ClothScene scene = make_cloth_scene(config, tiles);
   const Camera camera(request.camera);

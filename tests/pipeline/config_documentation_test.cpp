@@ -117,6 +117,15 @@ TEST(ConfigDocumentation, NamesEveryKeyOfASurfaceFabric) {
   }
 }
 
+TEST(ConfigDocumentation, TheReadmeNamesEverySurfaceFabric) {
+  std::ifstream stream(fs::path(HEDDLE_SOURCE_DIR) / "README.md");
+  std::stringstream text;
+  text << stream.rdbuf();
+  for (const std::string& name : surface_preset_names()) {
+    EXPECT_NE(text.str().find("`" + name + "`"), std::string::npos) << name;
+  }
+}
+
 TEST(ConfigDocumentation, NamesEveryKeyOfAScene) {
   Keys asked;
   for (const fs::path& file : files_in("scenes")) {

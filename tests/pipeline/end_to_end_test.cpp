@@ -7,6 +7,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "formats/image_file.h"
 #include "tests/pipeline/program.h"
 #include "tests/pipeline/small_fabric.h"
 #include "tests/support/temporary_folder.h"
@@ -244,6 +245,92 @@ TEST(PicturesEndToEnd, SameBytesForOneAndTwoThreadsAndNothingTwice) {
   EXPECT_EQ(shop.run({"render", "scene.toml", "-o", "x.exr", "--crop", "0,0,25,24"}).status, 2);
 }
 
+std::string edited(const char* original, const std::string& from, const std::string& to) {
+  std::string text = original;
+  const std::size_t at = text.find(from);
+  EXPECT_NE(at, std::string::npos) << from;
+  return text.replace(at, from.size(), to);
+}
+
+/// The small scene with a square of 3 mm below its cloth that a surface model draws.
+std::string scene_with_surface(const Workshop& shop, const std::string& surface) {
+  std::ofstream(shop / "square.obj") << "v -1.5 -1.5 -0.5\nv 1.5 -1.5 -0.5\nv 1.5 1.5 -0.5\nv -1.5 1.5 -0.5\n"
+                                        "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n";
+  return "[[cloth]]\nmesh = \"square.obj\"\nmesh_unit = \"mm\"\nuv_size_mm = 3\nsurface = \"" + surface + "\"\n";
+}
+
+TEST(SurfacesEndToEnd, SurfaceBesideFibersInEveryMethod) {
+  const Workshop shop;
+  const std::string surface = scene_with_surface(shop, "linen-plain");
+  // The fibers, 0.2 mm wide instead of 4, leave the surface open to the eye and to the lights.
+  const auto scene = [&](const std::string& width) {
+    std::string text = kSmallScene;
+    return text.replace(text.find("[4, 4]"), 6, "[" + width + ", 4]") + surface;
+  };
+  std::ofstream(shop / "beside.toml") << scene("0.2");
+  std::ofstream(shop / "over.toml") << scene("4");
+  for (const char* method : {"exact", "volume", "path"}) {
+    const auto render = [&](const std::string& name) {
+      const ProgramResult result =
+          shop.run({"render", name + ".toml", "-o", name + ".exr", "--method", method, "--spp", "4"});
+      EXPECT_EQ(result.status, 0) << method << ": " << result.error;
+      return read_exr(shop / (name + ".exr"));
+    };
+    const Image beside = render("beside");
+    const Image over = render("over");
+    // Mean over three columns, beside the fibers (1) and on them (11).
+    const auto blue = [](const Image& image, int column) {
+      float sum = 0;
+      for (int k = 0; k < 36; ++k)
+        sum += image.channels.at("B").values[static_cast<std::size_t>((6 + k / 3) * 24 + column + k % 3)];
+      return sum / 36;
+    };
+    EXPECT_GT(blue(beside, 1), 0.1F) << method << ": linen in the light";
+    EXPECT_GT(blue(beside, 11), 0.01F) << method << ": fibers beside it";
+    EXPECT_GT(blue(over, 11), 0.01F) << method << ": fibers over it";
+    EXPECT_NE(blue(beside, 1), blue(over, 1)) << method << ": the surface is hidden";
+    if (std::string(method) == "exact") {
+      EXPECT_EQ(beside.channels.at("segment").ids[12 * 24 + 2], 0xffffffffU);
+      EXPECT_NE(over.channels.at("segment").ids[12 * 24 + 2], 0xffffffffU);
+      EXPECT_GT(beside.channels.at("Z").values[12 * 24 + 2], 0.5F);
+    }
+  }
+}
+
+TEST(SurfacesEndToEnd, SurfacesAloneNeedNoStagesAndAnEditedOneMakesANewPicture) {
+  const Workshop shop;
+  const std::string preset = text_of(fs::path(HEDDLE_SOURCE_DIR) / "configs/fabrics/linen-plain.toml");
+  std::ofstream(shop / "own.toml") << preset;
+  std::string scene = kSmallScene;
+  const std::string fibers = "[[cloth]]\nflat_mm = [4, 4]\nfabric = \"fabric.toml\"\n";
+  scene.replace(scene.find(fibers), fibers.size(), scene_with_surface(shop, "own.toml"));
+  std::ofstream(shop / "alone.toml") << scene;
+
+  const auto built = [&](const char* threads, const char* folder) {
+    const Json report = shop.report({"run", "alone.toml", "-o", folder, "-j", threads});
+    EXPECT_EQ(report.at("stages").size(), 2U) << "picture and reference: " << report.dump();
+    return report.at("stages").at(0).at("built").get<bool>();
+  };
+  EXPECT_TRUE(built("2", "pictures.2"));
+  EXPECT_FALSE(built("2", "pictures.again"));
+  fs::remove_all(shop / "cache" / "picture");
+  EXPECT_TRUE(built("1", "pictures.1"));
+  for (const char* name : {"alone.exr", "alone-reference.exr"}) {
+    EXPECT_EQ(text_of(shop / "pictures.1" / name), text_of(shop / "pictures.2" / name)) << name;
+  }
+  for (const auto& entry : fs::directory_iterator(shop / "cache")) EXPECT_EQ(entry.path().filename(), "picture");
+
+  std::ofstream(shop / "own.toml") << "# comments change nothing\n" << preset;
+  EXPECT_FALSE(built("2", "pictures.again"));
+  std::ofstream(shop / "own.toml") << edited(preset.c_str(), "kd = 0.3", "kd = 0.4");
+  EXPECT_TRUE(built("2", "pictures.edited"));
+  EXPECT_NE(text_of(shop / "pictures.edited" / "alone.exr"), text_of(shop / "pictures.2" / "alone.exr"));
+
+  const Json info = shop.report({"info", "own.toml"});
+  EXPECT_EQ(info.at("model"), "microcylinder");
+  EXPECT_EQ(shop.report({"info", "alone.toml"}).at("fabrics").at(0), "own.toml");
+}
+
 struct BadInput {
   std::string name;
   Arguments arguments;
@@ -251,13 +338,6 @@ struct BadInput {
   int status;
   std::string message;  // part of what must be said
 };
-
-std::string edited(const char* original, const std::string& from, const std::string& to) {
-  std::string text = original;
-  const std::size_t at = text.find(from);
-  EXPECT_NE(at, std::string::npos) << from;
-  return text.replace(at, from.size(), to);
-}
 
 TEST(InputEndToEnd, BadInputIsNamed) {
   const Arguments synth = {"synth", "bad.toml"};
@@ -272,6 +352,12 @@ TEST(InputEndToEnd, BadInputIsNamed) {
       {"NaN", synth, edited(kSmallFabric, "beta_r_deg = 5", "beta_r_deg = nan"), 2, "beta_r_deg"},
       {"bad notation", synth, edited(kSmallFabric, "\"plain\"", "\"plaid\""), 2, "bad.toml:6:"},
       {"unknown fiber", synth, edited(kSmallFabric, "fiber = \"thread\"", "fiber = \"wool\""), 2, "wool"},
+      {"unknown surface",
+       {"render", "bad.toml", "-o", "x.exr"},
+       edited(kSmallScene, "fabric = \"fabric.toml\"", "surface = \"linen\""),
+       2,
+       "bad.toml:28:1: 'surface': expected a file that ends in .toml, or one of "},
+      {"surface as fabric", {"synth", "bad.toml"}, "model = \"microcylinder\"\n", 2, "no fibers"},
       {"no such config", {"synth", "missing.toml"}, "", 2, "missing.toml"},
       {"no such pack", {"check", "missing.pack"}, "", 1, "missing.pack"},
       {"no such file", {"info", "missing.exr"}, "", 1, "missing.exr"},

@@ -31,6 +31,15 @@ double angle(const EyeRay& a, const EyeRay& b) {
   return std::acos(a.direction.cast<double>().normalized().dot(b.direction.cast<double>().normalized()));
 }
 
+TEST(Camera, FootprintsGrowAlongARayAsWithDepth) {
+  const Camera camera(oblique());
+  for (const double x : {3.0, 100.0}) {
+    const EyeRay ray = camera.ray(x, 20);
+    const double depth = camera.depth(ray.origin + 70 * ray.direction.cast<double>());
+    EXPECT_NEAR(70 * ray.spread, camera.pixel_size(depth), 1e-6);
+  }
+}
+
 TEST(Camera, FieldOfViewSpansTheNamedAxis) {
   CameraConfig config = oblique();
   EXPECT_NEAR(angle(Camera(config).ray(0, 50), Camera(config).ray(200, 50)), config.fov, 1e-6);

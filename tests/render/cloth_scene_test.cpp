@@ -144,11 +144,12 @@ TEST(ClothScene, GlobalVisibilityCountsShellsAndMeshes) {
 TEST(ClothScene, UnderlayIsJustBelowTheFibers) {
   const auto tile = small_tile();
   const ClothScene lined({{tile, flat_cloth(4, 4), true}}, {});
-  const auto t = lined.first_black(Vec3d(0.1, 0.1, 5), Vec3(0, 0, -1));
-  ASSERT_TRUE(t);
-  const float z = 5 - *t;
+  const auto hit = lined.first_mesh(Vec3d(0.1, 0.1, 5), Vec3(0, 0, -1));
+  ASSERT_TRUE(hit);
+  EXPECT_EQ(hit->surface, nullptr);
+  const double z = 5 - hit->t;
   EXPECT_LT(z, tile->exemplar().z_min);
-  EXPECT_GT(z, tile->exemplar().z_min - 0.02F * (tile->exemplar().z_max - tile->exemplar().z_min));
+  EXPECT_GT(z, tile->exemplar().z_min - 0.02 * (tile->exemplar().z_max - tile->exemplar().z_min));
 }
 
 TEST(ClothScene, PiecesOfOneFabricShareTheirMaterials) {

@@ -5,6 +5,7 @@
 #include <fstream>
 
 #include "formats/input_error.h"
+#include "render/surface/surface_presets.h"
 #include "tests/support/temporary_folder.h"
 
 namespace heddle {
@@ -168,6 +169,13 @@ TEST_F(SceneConfigTest, MistakesAreLocated) {
       {"flat_mm = [30, 20]", "flat_mm = [30, 20]\nuv_size_mm = 3", "uv_size_mm"},
       {"flat_mm = [30, 20]", "flat_mm = [30, 20]\nmesh = \"drape.obj\"", "either"},
       {"fabric = \"silk.toml\"", "fabric = \"wool.toml\"", "wool.toml"},
+      {"fabric = \"silk.toml\"", "surface = \"silk\"", "scene.toml:22:"},
+      {"fabric = \"silk.toml\"", "surface = \"silk\"", "silk-crepe-de-chine, silk-shot, velvet"},
+      {"fabric = \"silk.toml\"", "surface = \"silk.toml\"", "model"},
+      {"fabric = \"silk.toml\"", "surface = \"wool.toml\"", "wool.toml"},
+      {"fabric = \"silk.toml\"", "surface = \"velvet\"", "underlay"},
+      {"fabric = \"silk.toml\"", "fabric = \"silk.toml\"\nsurface = \"velvet\"", "either fabric or surface"},
+      {"fabric = \"silk.toml\"\n", "", "either fabric or surface"},
       {"spp = 64", "spp = 63", "even"},
       {"name = \"test\"", "name = \"test\"\nnmae = 3", "nmae"},
   };
@@ -175,6 +183,38 @@ TEST_F(SceneConfigTest, MistakesAreLocated) {
     const std::string text = message(with(kScene, c.from, c.to));
     EXPECT_NE(text.find(c.expected), std::string::npos) << c.to << "\n" << text;
   }
+}
+
+TEST_F(SceneConfigTest, ASurfaceStandsInForAFabric) {
+  const std::string flat = "[[cloth]]\nflat_mm = [30, 20]\nfabric = \"silk.toml\"\n";
+  const auto cloth = [&](const std::string& lines) {
+    return read(with(kScene, flat, "[[cloth]]\nflat_mm = [30, 20]\n" + lines)).cloths[1];
+  };
+  EXPECT_FALSE(cloth("fabric = \"silk.toml\"\n").surface);
+  const ClothConfig velvet = cloth("surface = \"velvet\"\n");
+  EXPECT_TRUE(velvet.fabric.empty());
+  EXPECT_EQ(velvet.flat_height_mm, 20);
+  ASSERT_TRUE(velvet.surface && velvet.surface->model);
+  EXPECT_EQ(velvet.surface->name, "velvet");
+  const Vec3d wi = Vec3d(0.1, 0.5, 1).normalized();
+  const Vec3d wo = Vec3d(0.2, -0.3, 1).normalized();
+  const Rgbd expected = read_surface_model(surface_preset("velvet"))->reflected({}, wi, wo);
+  EXPECT_TRUE((velvet.surface->model->reflected({}, wi, wo) == expected).all());
+
+  // A file of the same content is the same surface; another content has another text.
+  const std::string of_velvet = velvet.surface->text;
+  std::string text;
+  {
+    std::ifstream preset(std::filesystem::path(HEDDLE_SOURCE_DIR) / "configs/fabrics/velvet.toml");
+    text.assign(std::istreambuf_iterator<char>(preset), {});
+  }
+  std::ofstream(folder_ / "own.toml") << "# a comment\n" << text;
+  EXPECT_EQ(cloth("surface = \"own.toml\"\n").surface->text, of_velvet);
+  std::ofstream(folder_ / "own.toml") << with(text, "ior = 1.", "ior = 1.1");
+  EXPECT_NE(cloth("surface = \"own.toml\"\n").surface->text, of_velvet);
+  std::ofstream(folder_ / "own.toml") << with(text, "model = \"microcylinder\"", "model = \"felt\"");
+  EXPECT_NE(message(with(kScene, flat, "[[cloth]]\nflat_mm = [30, 20]\nsurface = \"own.toml\"\n")).find("own.toml:"),
+            std::string::npos);
 }
 
 TEST_F(SceneConfigTest, ASceneNeedsLightAndCloth) {
