@@ -123,6 +123,7 @@ std::string SceneJob::picture_key(const PictureRequest& request) {
     if (cloth.mesh) values.emplace_back("mesh", content_hash_of_file(cloth.mesh->path));
     if (cloth.surface) values.emplace_back("surface", cloth.surface->text);
   }
+  for (const fs::path& map : config_.environment_files) values.emplace_back("environment", content_hash_of_file(map));
   for (const MeshFile& mesh : config_.meshes) values.emplace_back("mesh", content_hash_of_file(mesh.path));
   return stage_key(inputs);
 }
@@ -164,6 +165,7 @@ PictureResult SceneJob::render(const PictureRequest& request, const std::string&
     shown = now;
   };
 
+  double environment_error = 0;
   FrameBuffers frame;
   if (request.method == RenderMethod::kPath) {
     const std::vector<BcsdfTable> materials = scene_materials(*loaded.scene);
@@ -179,6 +181,7 @@ PictureResult SceneJob::render(const PictureRequest& request, const std::string&
                                        .volume = request.method == RenderMethod::kVolume,
                                        .shadow_sigma_mm = config_.shadow_sigma_mm};
     const PrecomputedRenderer renderer(*loaded.scene, packs, config_.lights, config_.background, settings);
+    environment_error = renderer.environment_error();
     frame = shade_picture(renderer, camera, request.crop, request.spp, report_progress);
   }
 
@@ -197,6 +200,7 @@ PictureResult SceneJob::render(const PictureRequest& request, const std::string&
   result.image = image_of(frame, metadata);
   for (const auto& [name, value] : metadata) result.report[name] = value;
   result.report["seconds"] = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  if (environment_error > 0) result.report["environment_fit_relative_error"] = environment_error;
   result.report["failed_shell_walks"] = loaded.scene->failed_walks();
   result.report["flipped_tetrahedra"] = loaded.scene->flipped_tets();
   result.report["degenerate_tetrahedra"] = loaded.scene->degenerate_tets();

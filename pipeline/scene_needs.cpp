@@ -10,6 +10,8 @@ Needs needs_of(RenderMethod method, std::span<const Light> lights) {
   needs.transfer = true;
   needs.volume = method == RenderMethod::kVolume;
   for (const Light& light : lights) {
+    // Gaussians that stand for an environment may be sharp and soft.
+    if (light.type == LightType::kEnvironment) needs.ssdf = needs.sgs = true;
     needs.ssdf |= light.is_directional() || light.sharpness > SingleScattering::kBlendFrom;
     needs.sgs |= !light.is_directional() && light.sharpness < SingleScattering::kBlendTo;
   }

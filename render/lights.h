@@ -2,23 +2,30 @@
 #define HEDDLE_RENDER_LIGHTS_H_
 // Lights at infinity: directional ones, and spherical Gaussians L(w) = irradiance G(w; axis, sharpness) /
 // M(sharpness). `irradiance` is the integral of L over all directions, measured perpendicular to the axis;
-// sharpness 0 is constant light from everywhere with L = irradiance / 4 pi. Tested in
-// tests/render/lights_test.cpp.
+// sharpness 0 is constant light from everywhere with L = irradiance / 4 pi. An environment is a picture of the light from
+// all around (environment_map.h), turned about the z axis. Tested in tests/render/lights_test.cpp.
 
 #include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
 
 #include "fibers/math/random.h"
 #include "fibers/math/vector.h"
 
 namespace heddle {
 
-enum class LightType : std::uint8_t { kDirectional, kSphericalGaussian };
+class EnvironmentMap;
+
+enum class LightType : std::uint8_t { kDirectional, kSphericalGaussian, kEnvironment };
 
 struct Light {
   LightType type = LightType::kDirectional;
-  Vec3 axis = Vec3(0, 0, 1);  // unit, towards the light
+  Vec3 axis = Vec3(0, 0, 1);  // unit, towards the light; of an environment, horizontal: where its picture's middle lies
   float sharpness = 0;        // spherical Gaussians only, >= 0
-  Rgb irradiance = Rgb(1, 1, 1);
+  Rgb irradiance = Rgb(1, 1, 1);  // of an environment: factor of the picture's radiance
+  std::shared_ptr<const EnvironmentMap> map = {};  // environments only
+  int gaussians = 0;                          // environments only: spherical Gaussians that stand for it in precomputed methods
 
   bool is_directional() const { return type == LightType::kDirectional; }
 };
@@ -39,6 +46,14 @@ LightSample sample_light(const Light& light, RandomStream& random);
 
 /// Density (1/sr) with which sample_light draws `direction`; 0 for directional lights.
 float light_pdf(const Light& light, const Vec3& direction);
+
+/// Lights for methods that know directional and Gaussian ones only: every environment as the Gaussians fitted to it.
+/// relative_error: of the worst fit, 0 without environments (environment_sgs.h).
+struct FittedLights {
+  std::vector<Light> lights;
+  double relative_error = 0;
+};
+FittedLights fit_environments(std::span<const Light> lights);
 
 }  // namespace heddle
 

@@ -48,10 +48,15 @@ std::optional<float> shape_of(const Light& light) {
 PrecomputedRenderer::PrecomputedRenderer(const ClothScene& scene, std::span<const FabricPack* const> packs,
                                          std::span<const Light> lights, const Rgb& background,
                                          const PrecomputedSettings& settings)
-    : scene_(&scene), lights_(lights), background_(background), settings_(settings) {
+    : scene_(&scene),
+      scene_lights_(lights),
+      fitted_(fit_environments(lights)),
+      lights_(fitted_.lights),
+      background_(background),
+      settings_(settings) {
   bool any_sharp = false;
   bool any_soft = false;
-  for (const Light& light : lights) {
+  for (const Light& light : lights_) {
     shapes_.emplace_back(shape_of(light));
     any_sharp = any_sharp || light.is_directional() || light.sharpness > SingleScattering::kBlendFrom;
     any_soft = any_soft || (!light.is_directional() && light.sharpness < SingleScattering::kBlendTo);
@@ -108,7 +113,7 @@ PrecomputedRenderer::GlobalVisibility PrecomputedRenderer::global_visibility(con
 }
 
 Rgb PrecomputedRenderer::surface_light(const SurfaceHit& hit, const Vec3& wo, RandomStream& random) const {
-  return surface_direct_light(hit, wo, lights_, LightEstimator::kCombined, random, [&](const Vec3& direction) {
+  return surface_direct_light(hit, wo, scene_lights_, LightEstimator::kCombined, random, [&](const Vec3& direction) {
     return scene_->globally_visible({hit.position, hit.normal}, direction);
   });
 }

@@ -52,6 +52,9 @@ class PrecomputedRenderer {
                       std::span<const Light> lights, const Rgb& background,
                       const PrecomputedSettings& settings);
 
+  /// Of the Gaussians that stand for environments; 0 without environments.
+  double environment_error() const { return fitted_.relative_error; }
+
   using Sample = EyeSample;
   /// What the first sample of a pixel sees; empty where that is no cloth.
   struct Seen {
@@ -87,7 +90,9 @@ class PrecomputedRenderer {
   GlobalVisibility global_visibility(const ShellHit& hit, const Light& light, RandomStream& random) const;
 
   const ClothScene* scene_;
-  std::span<const Light> lights_;
+  std::span<const Light> scene_lights_;  // what surface cloth is lit by
+  FittedLights fitted_;
+  std::span<const Light> lights_;  // what fibers are lit by: environments as Gaussians
   std::vector<MultipleScattering::LightShape> shapes_;  // [light]
   Rgb background_;
   PrecomputedSettings settings_;

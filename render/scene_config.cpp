@@ -4,6 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
+
+#include "render/environment_map.h"
 
 #include "render/surface/surface_presets.h"
 
@@ -101,9 +104,21 @@ std::string read_view_name(const TomlTable& table, const SceneConfig& scene) {
   return name;
 }
 
-Light read_light(const TomlTable& table) {
+Light read_light(const TomlTable& table, std::vector<std::filesystem::path>& environment_files) {
   Light light;
-  if (table.choice("type", {"directional", "sg"}) == "directional") {
+  const std::string type = table.choice("type", {"directional", "sg", "environment"});
+  if (type == "environment") {
+    light.type = LightType::kEnvironment;
+    const std::filesystem::path file = table.existing_file("map");
+    environment_files.push_back(file);
+    light.map = std::make_shared<const EnvironmentMap>(EnvironmentMap::read(file));
+    const double turn = radians(table.number("turn_deg", {-360, 360}, 0.0));
+    light.axis = Vec3d(std::cos(turn), std::sin(turn), 0).cast<float>();
+    light.irradiance = color(table.number3("scale", kLight, std::array<double, 3>{1, 1, 1}));
+    light.gaussians = static_cast<int>(table.integer("gaussians", 1, 128, 16));
+    return light;
+  }
+  if (type == "directional") {
     light.type = LightType::kDirectional;
     light.axis = unit_vector(table, "direction").cast<float>();
   } else {
@@ -187,7 +202,7 @@ SceneConfig read_scene_config(const TomlTable& document) {
   SceneConfig scene;
   scene.name = document.string("name");
   scene.background = color(document.number3("background", kLight, std::array<double, 3>{0, 0, 0}));
-  for (const TomlTable& table : document.tables("light")) scene.lights.push_back(read_light(table));
+  for (const TomlTable& table : document.tables("light")) scene.lights.push_back(read_light(table, scene.environment_files));
   if (scene.lights.empty()) document.fail("light", "expected at least one [[light]]");
   for (const TomlTable& table : document.tables("cloth")) scene.cloths.push_back(read_cloth(table));
   if (scene.cloths.empty()) document.fail("cloth", "expected at least one [[cloth]]");

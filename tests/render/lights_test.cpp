@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "fibers/math/quadrature.h"
+#include "render/environment_map.h"
 
 namespace heddle {
 namespace {
@@ -63,6 +64,60 @@ TEST(Lights, DirectionalLightIsFoundOnlyBySampling) {
   EXPECT_EQ(sample.weight[2], 3);
   EXPECT_EQ(sample.pdf, 0);
   EXPECT_EQ(light_radiance(light, light.axis)[0], 0);
+}
+
+/// A picture whose quarter about +x is bright, the rest dim.
+Light environment(double turn_deg) {
+  std::vector<Rgb> radiance(8 * 4, Rgb(0.1F, 0.1F, 0.1F));
+  for (int row = 0; row < 4; ++row) {
+    for (const int column : {3, 4}) radiance[static_cast<std::size_t>(8 * row + column)] = Rgb(3, 2, 1);
+  }
+  Light light;
+  light.type = LightType::kEnvironment;
+  light.map = std::make_shared<const EnvironmentMap>(8, 4, radiance);
+  light.axis = Vec3d(std::cos(radians(turn_deg)), std::sin(radians(turn_deg)), 0).cast<float>();
+  light.irradiance = {2, 2, 4};
+  light.gaussians = 6;
+  return light;
+}
+
+TEST(LightsLaw, AnEnvironmentTurnsWithItsAxis) {
+  EXPECT_FLOAT_EQ(light_radiance(environment(0), Vec3(1, 0, 0))[0], 6);
+  EXPECT_FLOAT_EQ(light_radiance(environment(0), Vec3(0, 1, 0))[0], 0.2F);
+  EXPECT_FLOAT_EQ(light_radiance(environment(90), Vec3(0, 1, 0))[2], 4);
+  EXPECT_FLOAT_EQ(light_radiance(environment(90), Vec3(1, 0, 0))[2], 0.4F);
+}
+
+TEST(LightsLaw, AnEnvironmentsWeightTimesDensityIsRadiance) {
+  const Light light = environment(35);
+  RandomStream random(1, RandomStage::kTest, 0, 0);
+  for (int k = 0; k < 200; ++k) {
+    const LightSample sample = sample_light(light, random);
+    EXPECT_NEAR(sample.pdf, light_pdf(light, sample.direction), 1e-4F * sample.pdf);
+    const Rgb radiance = light_radiance(light, sample.direction);
+    EXPECT_NEAR(radiance[1], sample.weight[1] * sample.pdf, 1e-4F * radiance[1]);
+  }
+}
+
+// The Gaussians bring the environment's light in sum, each from where it was turned to, and other lights stay as they are.
+TEST(LightsAgreement, GaussiansStandForAnEnvironment) {
+  const Light other = sg_light(20);
+  const std::vector<Light> scene = {other, environment(90)};
+  const FittedLights fitted = fit_environments(scene);
+  ASSERT_EQ(fitted.lights.size(), 7U);
+  EXPECT_EQ(fitted.lights[0].sharpness, other.sharpness);
+  EXPECT_GT(fitted.relative_error, 0);
+  EXPECT_LT(fitted.relative_error, 0.2);
+  Rgb sum = Rgb::Zero();
+  Vec3 towards = Vec3::Zero();
+  for (std::size_t k = 1; k < fitted.lights.size(); ++k) {
+    EXPECT_EQ(fitted.lights[k].type, LightType::kSphericalGaussian);
+    sum += fitted.lights[k].irradiance;
+    towards += fitted.lights[k].irradiance[0] * fitted.lights[k].axis;
+  }
+  const Rgbd integral = scene[1].map->integral();
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR(sum[c] / (integral[c] * scene[1].irradiance[c]), 1, 0.1) << c;
+  EXPECT_GT(towards.normalized().y(), 0.95F);
 }
 
 }  // namespace
