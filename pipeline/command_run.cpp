@@ -62,7 +62,7 @@ Image cropped(const Image& full, const PixelRect& crop) {
 
 int run_command(const RunOptions& options, const CommonOptions& common) {
   Job job(common);
-  SceneJob scene(options.scene, job.context(), options.order);
+  SceneJob scene(options.scene, job.context(), {.order = options.order, .fabric = {}, .blend = {}});
   const fs::path folder = options.output.empty() ? fs::path("out") / options.scene.stem() : options.output;
   make_folder(folder);
 

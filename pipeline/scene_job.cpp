@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <chrono>
 #include <cmath>
 
 #include "formats/atomic_file.h"
@@ -66,8 +65,8 @@ struct SceneJob::Loaded {
   std::unique_ptr<ClothScene> scene;
 };
 
-SceneJob::SceneJob(const fs::path& scene_file, StageContext& context, std::optional<int> order)
-    : context_(&context), order_(order) {
+SceneJob::SceneJob(const fs::path& scene_file, StageContext& context, const SceneVariant& variant)
+    : context_(&context), variant_(variant) {
   const TomlTable document = TomlTable::load(scene_file);
   config_ = read_scene_config(document);
   auto text = nlohmann::json::parse(document.canonical_text());
@@ -76,7 +75,7 @@ SceneJob::SceneJob(const fs::path& scene_file, StageContext& context, std::optio
   for (const ClothConfig& cloth : config_.cloths) {
     if (cloth.surface) continue;
     auto& stages = fabrics_[cloth.fabric];
-    if (!stages) stages = std::make_unique<FabricStages>(cloth.fabric, context);
+    if (!stages) stages = std::make_unique<FabricStages>(cloth.fabric, context, variant.fabric);
   }
 }
 
@@ -101,9 +100,23 @@ PictureRequest SceneJob::reference_request(const ViewConfig& view) const {
   return reference;
 }
 
+Needs SceneJob::needs_for(RenderMethod method) const {
+  Needs needs = needs_of(method, config_.lights, variant_.blend);
+  needs.order = variant_.order;
+  return needs;
+}
+
+std::vector<StageCost> SceneJob::precompute_costs(const PictureRequest& request) {
+  packs_for(request.method);
+  std::vector<StageCost> all;
+  for (auto& [file, stages] : fabrics_) {
+    for (StageCost& cost : stages->costs(needs_for(request.method))) all.push_back(std::move(cost));
+  }
+  return all;
+}
+
 std::vector<Artifact> SceneJob::packs_for(RenderMethod method) {
-  Needs needs = needs_of(method, config_.lights);
-  needs.order = order_;
+  const Needs needs = needs_for(method);
   std::vector<Artifact> packs;
   for (auto& [file, stages] : fabrics_) packs.push_back(stages->pack(needs));
   return packs;
@@ -117,6 +130,7 @@ std::string SceneJob::picture_key(const PictureRequest& request) {
   values.emplace_back("sampling", fmt::format("spp {} seed {}", request.spp, request.seed));
   values.emplace_back("paths", fmt::format("local {} bounces {} estimator {}", request.local,
                                            request.bounces.value_or(0), estimator_name(request.estimator)));
+  values.emplace_back("visibility", fmt::format("blend {} {}", variant_.blend.from, variant_.blend.to));
   values.emplace_back("shadow_sigma_mm", config_.shadow_sigma_mm ? fmt::format("{}", *config_.shadow_sigma_mm) : "");
   for (const Artifact& pack : packs_for(request.method)) values.emplace_back("pack", pack.key);
   for (const ClothConfig& cloth : config_.cloths) {
@@ -150,7 +164,7 @@ PictureResult SceneJob::render(const PictureRequest& request, const std::string&
   const std::string key = picture_key(request);
   const Loaded& loaded = loaded_for(request.method);
   const Camera camera(request.camera);
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch watch;
 
   // Progress in samples, or in seconds where those are the budget.
   const auto pixels = static_cast<std::uint64_t>(request.crop.width) * static_cast<std::uint64_t>(request.crop.height);
@@ -179,7 +193,8 @@ PictureResult SceneJob::render(const PictureRequest& request, const std::string&
     }
     const PrecomputedSettings settings{.seed = request.seed,
                                        .volume = request.method == RenderMethod::kVolume,
-                                       .shadow_sigma_mm = config_.shadow_sigma_mm};
+                                       .shadow_sigma_mm = config_.shadow_sigma_mm,
+                                       .blend = variant_.blend};
     const PrecomputedRenderer renderer(*loaded.scene, packs, config_.lights, config_.background, settings);
     environment_error = renderer.environment_error();
     frame = shade_picture(renderer, camera, request.crop, request.spp, report_progress);
@@ -199,7 +214,9 @@ PictureResult SceneJob::render(const PictureRequest& request, const std::string&
   };
   result.image = image_of(frame, metadata);
   for (const auto& [name, value] : metadata) result.report[name] = value;
-  result.report["seconds"] = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const WorkTime time = watch.elapsed();
+  result.report["seconds"] = time.seconds;
+  result.report["core_seconds"] = time.core_seconds;
   if (environment_error > 0) result.report["environment_fit_relative_error"] = environment_error;
   result.report["failed_shell_walks"] = loaded.scene->failed_walks();
   result.report["flipped_tetrahedra"] = loaded.scene->flipped_tets();

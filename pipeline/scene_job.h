@@ -16,8 +16,17 @@
 #include "pipeline/stages.h"
 #include "render/path_tracer.h"
 #include "render/scene_config.h"
+#include "render/single_scattering.h"
 
 namespace heddle {
+
+/// How the precomputed data of a scene's pictures differ from what its files say.
+struct SceneVariant {
+  std::optional<int> order;  // of the transfer; the fabric's where empty
+  FabricVariant fabric;
+  VisibilityBlend blend;
+  auto operator<=>(const SceneVariant&) const = default;
+};
 
 /// One picture of a scene.
 struct PictureRequest {
@@ -41,8 +50,8 @@ struct PictureResult {
 
 class SceneJob {
  public:
-  /// `context` outlives the object. order: of the transfer, the fabric's where empty.
-  SceneJob(const std::filesystem::path& scene_file, StageContext& context, std::optional<int> order);
+  /// `context` outlives the object.
+  SceneJob(const std::filesystem::path& scene_file, StageContext& context, const SceneVariant& variant = {});
   ~SceneJob();
 
   const SceneConfig& config() const { return config_; }
@@ -54,16 +63,19 @@ class SceneJob {
   /// Builds what the picture needs; equal keys, equal pictures.
   std::string picture_key(const PictureRequest& request);
   PictureResult render(const PictureRequest& request, const std::string& title);
+  /// What the precomputed data of the picture took to build, all fabrics; they are built where missing.
+  std::vector<StageCost> precompute_costs(const PictureRequest& request);
 
  private:
   struct Loaded;
+  Needs needs_for(RenderMethod method) const;
   std::vector<Artifact> packs_for(RenderMethod method);
   const Loaded& loaded_for(RenderMethod method);
 
   SceneConfig config_;
   std::string scene_text_;  // canonical text of what all pictures of the scene depend on
   StageContext* context_;
-  std::optional<int> order_;
+  SceneVariant variant_;
   std::map<std::filesystem::path, std::unique_ptr<FabricStages>> fabrics_;
   std::map<RenderMethod, std::unique_ptr<Loaded>> loaded_;
 };

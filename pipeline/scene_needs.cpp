@@ -1,10 +1,8 @@
 #include "pipeline/scene_needs.h"
 
-#include "render/single_scattering.h"
-
 namespace heddle {
 
-Needs needs_of(RenderMethod method, std::span<const Light> lights) {
+Needs needs_of(RenderMethod method, std::span<const Light> lights, const VisibilityBlend& blend) {
   Needs needs;
   if (method == RenderMethod::kPath) return needs;
   needs.transfer = true;
@@ -12,8 +10,8 @@ Needs needs_of(RenderMethod method, std::span<const Light> lights) {
   for (const Light& light : lights) {
     // Gaussians that stand for an environment may be sharp and soft.
     if (light.type == LightType::kEnvironment) needs.ssdf = needs.sgs = true;
-    needs.ssdf |= light.is_directional() || light.sharpness > SingleScattering::kBlendFrom;
-    needs.sgs |= !light.is_directional() && light.sharpness < SingleScattering::kBlendTo;
+    needs.ssdf |= light.is_directional() || blend.uses_distance(light.sharpness);
+    needs.sgs |= !light.is_directional() && blend.uses_lobes(light.sharpness);
   }
   return needs;
 }

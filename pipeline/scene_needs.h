@@ -10,10 +10,11 @@
 #include "pipeline/stages.h"
 #include "render/lights.h"
 #include "render/scene_config.h"
+#include "render/single_scattering.h"
 
 namespace heddle {
 
-Needs needs_of(RenderMethod method, std::span<const Light> lights);
+Needs needs_of(RenderMethod method, std::span<const Light> lights, const VisibilityBlend& blend = {});
 
 }  // namespace heddle
 

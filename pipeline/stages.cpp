@@ -2,9 +2,9 @@
 
 #include <fmt/format.h>
 
-#include <chrono>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "fibers/baked/fabric_pack.h"
 #include "fibers/cloth/synthesize.h"
@@ -24,7 +24,6 @@ namespace heddle {
 namespace {
 
 namespace fs = std::filesystem;
-using Clock = std::chrono::steady_clock;
 
 // Segments per visibility chunk and cells per transfer chunk: a few seconds of two cores, so that little is lost when a
 // job is killed, and enough work for many threads.
@@ -52,6 +51,35 @@ TransferChunk read_transfer_chunk(const fs::path& path, std::uint32_t first_cell
   return chunk;
 }
 
+void write_cost(const fs::path& file, const WorkTime& time) {
+  const nlohmann::ordered_json cost = {{"seconds", time.seconds},
+                                       {"core_seconds", time.core_seconds},
+                                       {"threads", working_threads()},
+                                       {"program_version", kProgramVersion}};
+  write_file_atomically(file, cost.dump() + "\n");
+}
+
+/// seconds = -1 where there is no readable record.
+StageCost read_cost(const fs::path& file) {
+  StageCost cost;
+  cost.seconds = cost.core_seconds = -1;
+  if (!fs::exists(file)) return cost;
+  const std::vector<std::byte> bytes = read_whole_file(file);
+  const auto* text = reinterpret_cast<const char*>(bytes.data());
+  const auto record = nlohmann::json::parse(text, text + bytes.size(), nullptr, false);
+  if (record.is_discarded() || !record.is_object()) return cost;
+  const auto number = [&record](const char* key) {
+    const auto found = record.find(key);
+    return found != record.end() && found->is_number() ? found->get<double>() : -1.0;
+  };
+  cost.seconds = number("seconds");
+  cost.core_seconds = number("core_seconds");
+  cost.threads = static_cast<int>(number("threads"));
+  return cost;
+}
+
+fs::path chunk_cost_file(fs::path chunk) { return chunk.replace_extension(".cost.json"); }
+
 std::string hash_of_geometry(const Exemplar& exemplar) {
   const auto bytes_of = [](const auto& values) { return content_hash(std::as_bytes(std::span(values))); };
   return stage_key({"geometry",
@@ -64,7 +92,8 @@ std::string hash_of_geometry(const Exemplar& exemplar) {
 
 }  // namespace
 
-FabricDocument read_fabric_document(const fs::path& path, std::optional<std::uint64_t> seed) {
+FabricDocument read_fabric_document(const fs::path& path, std::optional<std::uint64_t> seed,
+                                    const FabricVariant& variant) {
   const TomlTable document = TomlTable::load(path);
   if (document.has("model")) document.fail("model", "this fabric has no fibers: a scene names it by the key surface");
   FabricDocument fabric;
@@ -96,11 +125,21 @@ FabricDocument read_fabric_document(const fs::path& path, std::optional<std::uin
     }
     return section;
   };
+  // As if the config said so.
+  const auto change = [](nlohmann::json& section, const char* name, const char* key, double& value, double factor) {
+    if (factor == 1) return;
+    value *= factor;
+    section["set"][key] = value;
+    section["defaults"].erase(fmt::format("{}.{}", name, key));
+  };
   fabric.visibility_text = take_section("visibility").dump();
   nlohmann::json transfer = take_section("transfer");
+  change(transfer, "transfer", "cell_mean_free_paths", fabric.transfer.cell_mean_free_paths, variant.cell_size);
   transfer["set"].erase("order");  // part of the key on its own
   fabric.transfer_text = transfer.dump();
-  fabric.volume_text = take_section("volume").dump();
+  nlohmann::json volume = take_section("volume");
+  change(volume, "volume", "voxels_per_radius", fabric.volume.voxels_per_radius, variant.voxel_rate);
+  fabric.volume_text = volume.dump();
   cloth.erase("name");
   cloth.erase("light_from");
   cloth["seed"] = fabric.config.seed;
@@ -116,8 +155,8 @@ struct FabricStages::Stage {
   std::map<std::string, std::string> metadata;
 };
 
-FabricStages::FabricStages(const fs::path& fabric_file, StageContext& context)
-    : document_(read_fabric_document(fabric_file, context.seed)), context_(&context) {}
+FabricStages::FabricStages(const fs::path& fabric_file, StageContext& context, const FabricVariant& variant)
+    : document_(read_fabric_document(fabric_file, context.seed, variant)), context_(&context) {}
 
 FabricStages::~FabricStages() = default;
 
@@ -150,14 +189,39 @@ Artifact FabricStages::artifact_of(const Stage& stage, Build&& build) {
   StageResult result{.fabric = document_.config.name, .stage = stage.name, .key = stage.key, .artifact = artifact.path};
   if (!fs::exists(artifact.path)) {
     stop_if_interrupted();
-    const Clock::time_point start = Clock::now();
+    const WorkTime outer = std::exchange(context_->nested, {});
+    const Stopwatch watch;
     context_->cache.prepare(stage.name, stage.key, stage.extension);
     build(artifact.path, result);
     result.built = true;
-    result.seconds = std::chrono::duration<double>(Clock::now() - start).count();
+    const WorkTime whole = watch.elapsed();
+    const WorkTime own = whole - context_->nested;
+    context_->nested = outer + whole;
+    result.seconds = own.seconds;
+    write_cost(cost_file(stage), own + result.earlier);
   }
   context_->report(std::move(result));
   return artifact;
+}
+
+fs::path FabricStages::cost_file(const Stage& stage) const {
+  return context_->cache.artifact(stage.name, stage.key, ".cost.json");
+}
+
+std::vector<StageCost> FabricStages::costs(const Needs& needs) {
+  std::vector<StageCost> costs;
+  const auto add = [&](const Stage& stage) {
+    costs.push_back(read_cost(cost_file(stage)));
+    costs.back().stage = stage.name;
+    costs.back().key = stage.key;
+  };
+  add(synth_stage());
+  if (needs.ssdf || needs.sgs) add(maps_stage());
+  if (needs.ssdf) add(ssdf_stage());
+  if (needs.sgs) add(sg_stage());
+  if (needs.transfer) add(transfer_stage(transfer_settings(needs.order)));
+  if (needs.volume) add(volume_stage());
+  return costs;
 }
 
 const Exemplar& FabricStages::exemplar() {
@@ -183,8 +247,12 @@ const std::string& FabricStages::geometry_key() {
   return geometry_key_;
 }
 
+FabricStages::Stage FabricStages::synth_stage() const {
+  return make_stage("synth", 1, ".safetensors", document_.cloth_text, {});
+}
+
 Artifact FabricStages::synth() {
-  const Stage stage = make_stage("synth", 1, ".safetensors", document_.cloth_text, {});
+  const Stage stage = synth_stage();
   return artifact_of(stage, [&](const fs::path& path, StageResult&) {
     try {
       write_exemplar(path, synthesize(document_.config), stage.metadata);
@@ -207,6 +275,8 @@ void FabricStages::finish_chunks(const Stage& stage, std::uint32_t items, std::u
     items_of_shard += size;
     if (chunks.has(first)) {
       ++result.resumed;
+      const StageCost cost = read_cost(chunk_cost_file(chunks.file(first)));
+      if (cost.seconds > 0) result.earlier = result.earlier + WorkTime{cost.seconds, cost.core_seconds};
       items_done += size;
     } else {
       missing.push_back(first);
@@ -216,7 +286,10 @@ void FabricStages::finish_chunks(const Stage& stage, std::uint32_t items, std::u
   for (const std::uint32_t first : missing) {
     stop_if_interrupted();
     const std::uint32_t size = std::min(per_chunk, items - first);
-    compute(chunks.prepare(first), first, first + size);
+    const Stopwatch watch;
+    const fs::path file = chunks.prepare(first);
+    compute(file, first, first + size);
+    write_cost(chunk_cost_file(file), watch.elapsed());
     ++result.chunks;
     progress.advance(size);
   }
@@ -248,10 +321,10 @@ void FabricStages::run_shard(const Stage& stage, Work&& work) {
                      .key = stage.key,
                      .artifact = context_->cache.artifact(stage.name, stage.key, stage.extension)};
   if (!fs::exists(result.artifact)) {
-    const Clock::time_point start = Clock::now();
+    const Stopwatch watch;
     work(result);
     result.built = result.chunks > 0;
-    result.seconds = std::chrono::duration<double>(Clock::now() - start).count();
+    result.seconds = watch.elapsed().seconds;
   }
   context_->report(std::move(result));
 }
@@ -307,15 +380,18 @@ FabricStages::Stage FabricStages::fit_stage(const std::string& name, int version
                     {{"maps", maps_stage().key}, {"seed", fmt::format("{}", document_.config.seed)}});
 }
 
+FabricStages::Stage FabricStages::ssdf_stage() { return fit_stage("ssdf", 1); }
+FabricStages::Stage FabricStages::sg_stage() { return fit_stage("sg", 1); }
+
 Artifact FabricStages::ssdf() {
-  const Stage stage = fit_stage("ssdf", 1);
+  const Stage stage = ssdf_stage();
   return artifact_of(stage, [&](const fs::path& path, StageResult&) {
     write_ssdf(path, fit_ssdf(read_visibility_maps(maps().path), document_.visibility), stage.metadata);
   });
 }
 
 Artifact FabricStages::sgs() {
-  const Stage stage = fit_stage("sg", 1);
+  const Stage stage = sg_stage();
   return artifact_of(stage, [&](const fs::path& path, StageResult&) {
     write_sg_visibility(path, fit_sgs(read_visibility_maps(maps().path), document_.visibility), stage.metadata);
   });
@@ -382,8 +458,12 @@ Artifact FabricStages::transfer(std::optional<int> order) {
   });
 }
 
+FabricStages::Stage FabricStages::volume_stage() {
+  return make_stage("voxelize", 1, ".vdb", document_.volume_text, {{"geometry", geometry_key()}});
+}
+
 Artifact FabricStages::volume() {
-  const Stage stage = make_stage("voxelize", 1, ".vdb", document_.volume_text, {{"geometry", geometry_key()}});
+  const Stage stage = volume_stage();
   return artifact_of(stage, [&](const fs::path& path, StageResult&) {
     write_id_volume(path, voxelize(exemplar(), document_.volume), stage.metadata);
   });

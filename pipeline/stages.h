@@ -17,6 +17,7 @@
 // (stages.cpp).
 // Errors: ConfigError, FileError, Interrupted. Tested in tests/pipeline/end_to_end_test.cpp.
 
+#include <compare>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -31,6 +32,7 @@
 #include "fibers/tracing/tile_scene.h"
 #include "pipeline/cache.h"
 #include "pipeline/console.h"
+#include "pipeline/work_time.h"
 #include "precompute/transfer_bake.h"
 #include "precompute/visibility_settings.h"
 #include "precompute/voxelize.h"
@@ -63,7 +65,8 @@ struct StageResult {
   bool built = false;         // false: found in the cache
   std::uint64_t chunks = 0;   // finished by this process
   std::uint64_t resumed = 0;  // chunks found finished
-  double seconds = 0;
+  WorkTime earlier = {};      // that other processes spent on the chunks found
+  double seconds = 0;  // of this stage alone
 };
 
 /// What stages of several fabrics share during one command.
@@ -72,9 +75,26 @@ struct StageContext {
   Console* console;
   std::optional<std::uint64_t> seed;  // in place of the fabric's
   std::vector<StageResult> results;
+  WorkTime nested = {};  // spent by stages that the running stage asked for
 
   /// Says how a stage went, once per key, and notes it for the report.
   void report(StageResult result);
+};
+
+/// Settings of a fabric changed for one purpose (a chart), as factors of what its config says; keys change with them.
+struct FabricVariant {
+  double cell_size = 1;   // of [transfer] cell_mean_free_paths
+  double voxel_rate = 1;  // of [volume] voxels_per_radius
+  auto operator<=>(const FabricVariant&) const = default;
+};
+
+/// What it took to build an artifact, without what it read. Kept beside it as KEY.cost.json.
+struct StageCost {
+  std::string stage;
+  std::string key;
+  double seconds = 0;
+  double core_seconds = 0;  // processor time of all threads
+  int threads = 0;
 };
 
 /// A fabric file, read and checked.
@@ -89,7 +109,8 @@ struct FabricDocument {
   std::string transfer_text;    // of [transfer] without order
   std::string volume_text;      // of [volume]
 };
-FabricDocument read_fabric_document(const std::filesystem::path& path, std::optional<std::uint64_t> seed);
+FabricDocument read_fabric_document(const std::filesystem::path& path, std::optional<std::uint64_t> seed,
+                                    const FabricVariant& variant = {});
 
 /// Where a stage's artifact lies.
 struct Artifact {
@@ -103,7 +124,7 @@ inline constexpr int kMeanFreePathSamples = 20000;
 class FabricStages {
  public:
   /// `context` outlives the object. A relative path is taken from the working directory.
-  FabricStages(const std::filesystem::path& fabric_file, StageContext& context);
+  FabricStages(const std::filesystem::path& fabric_file, StageContext& context, const FabricVariant& variant = {});
   ~FabricStages();
 
   const FabricDocument& document() const { return document_; }
@@ -116,6 +137,10 @@ class FabricStages {
   Artifact volume();
   Artifact pack(const Needs& needs);
 
+  /// What the stages behind pack(needs) took when they were built, by whatever process; seconds < 0 where an artifact came
+  /// without its record.
+  std::vector<StageCost> costs(const Needs& needs);
+
   /// Computes this shard's chunks and leaves them in the cache; a later run of the stage finds them.
   void visibility_shard(Shard shard);
   void transfer_shard(std::optional<int> order, Shard shard);
@@ -123,6 +148,7 @@ class FabricStages {
  private:
   struct Stage;
   struct TransferWork;
+  std::filesystem::path cost_file(const Stage& stage) const;
   Stage make_stage(std::string name, int version, std::string extension, const std::string& config,
                    std::vector<std::pair<std::string, std::string>> upstream) const;
   template <class Build>
@@ -144,7 +170,11 @@ class FabricStages {
   Stage maps_stage();
   Artifact maps();
   void compute_maps(const Stage& stage, const std::filesystem::path& file, std::uint32_t first, std::uint32_t end);
+  Stage synth_stage() const;
   Stage fit_stage(const std::string& name, int version);
+  Stage ssdf_stage();
+  Stage sg_stage();
+  Stage volume_stage();
   TransferSettings transfer_settings(std::optional<int> order) const;
   Stage transfer_stage(const TransferSettings& settings);
   std::unique_ptr<TransferWork> transfer_work(const TransferSettings& settings);

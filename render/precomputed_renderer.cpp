@@ -58,8 +58,8 @@ PrecomputedRenderer::PrecomputedRenderer(const ClothScene& scene, std::span<cons
   bool any_soft = false;
   for (const Light& light : lights_) {
     shapes_.emplace_back(shape_of(light));
-    any_sharp = any_sharp || light.is_directional() || light.sharpness > SingleScattering::kBlendFrom;
-    any_soft = any_soft || (!light.is_directional() && light.sharpness < SingleScattering::kBlendTo);
+    any_sharp = any_sharp || light.is_directional() || settings.blend.uses_distance(light.sharpness);
+    any_soft = any_soft || (!light.is_directional() && settings.blend.uses_lobes(light.sharpness));
   }
   std::map<const FabricPack*, std::shared_ptr<const IdBricks>> bricks;
   for (std::uint32_t cloth = 0; cloth < packs.size(); ++cloth) {
@@ -73,7 +73,8 @@ PrecomputedRenderer::PrecomputedRenderer(const ClothScene& scene, std::span<cons
     const Shell& shell = scene.shell(cloth);
     cloths_.push_back(
         {&pack, own_bricks,
-         SingleScattering(pack.ssdf ? &*pack.ssdf : nullptr, pack.sgs ? &*pack.sgs : nullptr, pack.materials),
+         SingleScattering(pack.ssdf ? &*pack.ssdf : nullptr, pack.sgs ? &*pack.sgs : nullptr, pack.materials,
+                          settings.blend),
          MultipleScattering(*pack.transfer, pack.materials),
          settings.shadow_sigma_mm.value_or(shell.z_max() - shell.z_min())});
   }

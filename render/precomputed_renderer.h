@@ -42,6 +42,7 @@ struct PrecomputedSettings {
   bool volume = false;  // eye rays through the packs' id volumes instead of against fibers
   // Deviation of the Gaussian; the thickness of the cloth where absent.
   std::optional<double> shadow_sigma_mm;
+  VisibilityBlend blend;
 };
 
 class PrecomputedRenderer {

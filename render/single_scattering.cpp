@@ -30,7 +30,7 @@ Rgb SingleScattering::directional(const ShadingPoint& point, const DirectionPair
 
 Rgb SingleScattering::spherical_gaussian(const ShadingPoint& point, const DirectionPair& axis,
                                          float sharpness) const {
-  const float share = std::clamp((sharpness - kBlendFrom) / (kBlendTo - kBlendFrom), 0.0F, 1.0F);
+  const float share = std::clamp((sharpness - blend_.from) / (blend_.to - blend_.from), 0.0F, 1.0F);
   if (share <= 0) return soft(point, axis, sharpness);
   if (share >= 1) return sharp(point, axis, sharpness);
   return (1 - share) * soft(point, axis, sharpness) + share * sharp(point, axis, sharpness);

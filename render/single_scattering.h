@@ -4,7 +4,7 @@
 // (Khungurn 2017, section 5.2). Results are radiance for a light of irradiance 1, before macroscopic shadows.
 //
 // A directional light along w:      V(w) S(w, wo) cos(theta_w), V = 1 where the signed distance to the edge of visibility
-// is > 0. A spherical Gaussian (axis xi, sharpness l, mass M(l)) is blended linearly in l over [100, 200] between
+// is > 0. A spherical Gaussian (axis xi, sharpness l, mass M(l)) is blended linearly in l over [100, 200] (VisibilityBlend) between
 //   soft:   1 / M(l) sum over lobes q of w_q / M(s) exp(n_q - s - l) Gamma(v_q / n_q, n_q, wo),
 //           v_q = s xi_q + l xi, n_q = |v_q|, s the lobes' sharpness;
 //   sharp:  (1 + erf(sqrt(l / 2) d(xi))) / 2 * Gamma(xi, l, wo) / M(l),  d the signed distance.
@@ -16,6 +16,7 @@
 // Gamma is what BcsdfTable::sg_scatter computes; its errors are stated there. Tested in
 // tests/render/single_scattering_test.cpp.
 
+#include <compare>
 #include <span>
 
 #include "fibers/baked/segment_visibility.h"
@@ -39,17 +40,25 @@ struct ShadingPoint {
   DirectionPair wo;
 };
 
+/// Which form of visibility serves a spherical Gaussian; a directional light always takes the signed distance.
+struct VisibilityBlend {
+  float from = 100;  // sharpness above which the signed distance takes part
+  float to = 200;    // sharpness from which the lobes no longer do; > from
+
+  auto operator<=>(const VisibilityBlend&) const = default;
+  bool uses_distance(float sharpness) const { return sharpness > from; }
+  bool uses_lobes(float sharpness) const { return sharpness < to; }
+};
+inline constexpr VisibilityBlend kSignedDistanceOnly{-2, -1};
+inline constexpr VisibilityBlend kLobesOnly{1e30F, 2e30F};
+
 class SingleScattering {
  public:
   /// Either representation may be absent (nullptr) where no light needs it. What is passed must outlive this
   /// object.
   SingleScattering(const SsdfVisibility* ssdf, const SgVisibility* lobes,
-                   std::span<const BcsdfTable> materials)
-      : ssdf_(ssdf), lobes_(lobes), materials_(materials) {}
-
-  /// Sharpness from which the signed distance takes part, and from which the lobes no longer do.
-  static constexpr float kBlendFrom = 100;
-  static constexpr float kBlendTo = 200;
+                   std::span<const BcsdfTable> materials, const VisibilityBlend& blend = {})
+      : ssdf_(ssdf), lobes_(lobes), materials_(materials), blend_(blend) {}
 
   Rgb directional(const ShadingPoint& point, const DirectionPair& light) const;
   /// sharpness 0: constant light from everywhere.
@@ -61,6 +70,7 @@ class SingleScattering {
   const SsdfVisibility* ssdf_;
   const SgVisibility* lobes_;
   std::span<const BcsdfTable> materials_;
+  VisibilityBlend blend_;
 };
 
 }  // namespace heddle

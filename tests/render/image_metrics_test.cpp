@@ -66,5 +66,55 @@ TEST(ImageMetrics, DifferencePictureColours) {
             (std::vector<std::uint8_t>{255, 255, 255, 255, 0, 0, 0, 0, 255}));
 }
 
+// A picture that is off by a factor has no spread: block after block says the same.
+TEST(ImageMetrics, EstimateOfAUniformFactor) {
+  const std::vector<Rgb> reference(24 * 16, Rgb(0.5F, 1.0F, 1.5F));
+  const std::vector<Rgb> picture(24 * 16, Rgb(0.55F, 1.1F, 1.65F));
+  const PictureErrorEstimate estimate = estimate_error(picture, {reference, reference}, 24, 16, 8);
+  EXPECT_EQ(estimate.blocks, 6);
+  EXPECT_NEAR(estimate.color_ratio[1], 1.1, 1e-6);
+  EXPECT_NEAR(estimate.color_ratio_error.maxCoeff(), 0, 1e-9);
+  EXPECT_NEAR(estimate.relative_rmse, 0.1 * std::sqrt((0.25 + 1 + 2.25) / 3), 1e-6);
+  EXPECT_NEAR(estimate.rmse_high, estimate.rmse_low, 1e-6);
+  EXPECT_NEAR(estimate.percentile99, 0.15, 1e-6);
+}
+
+// The interval of many noisy pictures of known error holds that error in 95 % of them, within 4 standard errors of that count
+// (sqrt(400 * 0.95 * 0.05) = 4.4), and the same for the mean colour at 1.96 standard errors.
+TEST(ImageMetricsStatistical, IntervalsHoldTheTruth) {
+  constexpr int kPictures = 400;
+  constexpr int kEdge = 32;
+  constexpr double kNoise = 0.2;  // standard deviation per value of the picture and of each half
+  int rmse_held = 0;
+  int color_held = 0;
+  for (int n = 0; n < kPictures; ++n) {
+    RandomStream random(7, RandomStage::kTest, static_cast<std::uint64_t>(n), 0);
+    std::vector<Rgb> pictures[3];
+    for (std::vector<Rgb>& picture : pictures) {
+      for (int k = 0; k < kEdge * kEdge; ++k) {
+        Rgb value;
+        for (int c = 0; c < 3; ++c) {
+          value[c] = static_cast<float>(1 + kNoise * std::sqrt(12.0) * (static_cast<double>(random.uniform()) - 0.5));
+        }
+        picture.push_back(value);
+      }
+    }
+    const PictureErrorEstimate estimate = estimate_error(pictures[0], {pictures[1], pictures[2]}, kEdge, kEdge, 4);
+    rmse_held += estimate.rmse_low <= kNoise && kNoise <= estimate.rmse_high ? 1 : 0;
+    color_held += std::abs(estimate.color_ratio[0] - 1) <= 1.96 * estimate.color_ratio_error[0] ? 1 : 0;
+  }
+  std::printf("  held by the interval: RMSE %d, colour %d of %d\n", rmse_held, color_held, kPictures);
+  EXPECT_NEAR(rmse_held, 0.95 * kPictures, 4 * 4.4);
+  EXPECT_NEAR(color_held, 0.95 * kPictures, 4 * 4.4);
+}
+
+TEST(ImageMetrics, NoiseOfAReference) {
+  const std::vector<Rgb> half0(100, Rgb(1.1F, 1.1F, 1.1F));
+  const std::vector<Rgb> half1(100, Rgb(0.9F, 0.9F, 0.9F));
+  EXPECT_NEAR(reference_noise({half0, half1}).rms, 0.1, 1e-6);
+  EXPECT_NEAR(reference_noise({half0, half1}).percentile99, 0.1, 1e-6);
+  EXPECT_EQ(reference_noise({half0, half0}).rms, 0);
+}
+
 }  // namespace
 }  // namespace heddle
