@@ -68,6 +68,21 @@ struct CompareOptions {
 /// Status 1 where a limit is exceeded; ConfigError (2) where the pictures cannot be compared.
 int compare_command(const CompareOptions& options, const CommonOptions& common);
 
+struct ChartOptions {
+  std::filesystem::path scene;
+  std::filesystem::path output;  // folder
+  std::string view;              // the scene's first where empty
+  std::optional<int> width;      // px; 96 or less where neither is given, the other by the view's shape
+  std::optional<int> height;
+  std::vector<int> crop;  // x0, y0, x1, y1, or empty; of the view's own frame where no width or height is given
+  int reference_spp = 1024;
+  bool quick = false;
+  bool resume = false;
+};
+/// Speed against accuracy, over the methods and their settings: chart.csv, chart.json, chart.svg, chart-local.svg,
+/// index.html and runs/ in `output` (docs/chart.md). Status 1 where every run failed.
+int chart_command(const ChartOptions& options, const CommonOptions& common);
+
 /// Prints what a file holds.
 int info_command(const std::filesystem::path& path, const CommonOptions& common);
 

@@ -49,6 +49,7 @@ struct Options {
   std::filesystem::path path;
   RenderOptions render;
   CompareOptions compare;
+  ChartOptions chart;
   RunOptions run;
 };
 
@@ -151,6 +152,24 @@ std::map<std::string, std::function<int()>> add_commands(CLI::App& app, Options&
   compare->add_option("--max-mean", pair.max_mean, "Status 1 where the mean colour is off by a larger share")
       ->check(CLI::NonNegativeNumber);
   actions["compare"] = [&options] { return compare_command(options.compare, options.common); };
+
+  CLI::App* chart = app.add_subcommand("chart", "Speed against accuracy, over the methods and their settings");
+  ChartOptions& asked = options.chart;
+  add_building(*chart, options);
+  chart->add_option("SCENE.toml", asked.scene, "Scene config")->required();
+  chart->add_option("-o,--output,--outfile", asked.output, "Folder of the chart")->required();
+  chart->add_option("--view", asked.view, "Name of one of the scene's [[view]] tables; its [camera] where absent");
+  chart->add_option("--width", asked.width, "Pixels; 96 where neither width nor height nor crop is given")
+      ->check(CLI::Range(1, 16384));
+  chart->add_option("--height", asked.height, "Pixels; by the view's shape where absent")->check(CLI::Range(1, 16384));
+  chart->add_option("--crop,--cropwindow", asked.crop, "x0,y0,x1,y1 in pixels, x1 and y1 excluded")
+      ->delimiter(',')
+      ->expected(4);
+  chart->add_option("--reference-spp", asked.reference_spp, "Samples per pixel of the two references, 1024 where absent")
+      ->check(CLI::Range(2, 1 << 24));
+  chart->add_flag("--quick", asked.quick, "Few settings per method: a look, or a check that all of it works");
+  chart->add_flag("--resume", asked.resume, "Keep what an earlier chart in the same folder has rendered and timed");
+  actions["chart"] = [&options] { return chart_command(options.chart, options.common); };
 
   CLI::App* info = app.add_subcommand("info", "What a file holds: any of ours, or any that we read");
   add_common(*info, options);

@@ -1,0 +1,95 @@
+#include "pipeline/chart/chart_runs.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace heddle {
+namespace {
+
+using Settings = nlohmann::ordered_json;
+
+PictureRequest with(PictureRequest request, RenderMethod method, int spp) {
+  request.method = method;
+  request.spp = spp;
+  return request;
+}
+
+PictureRequest local(PictureRequest request) {
+  request.local = true;
+  return request;
+}
+
+std::string spp_label(int spp) { return fmt::format("{} spp", spp); }
+
+SceneVariant of_order(int order) {
+  SceneVariant variant;
+  variant.order = order;
+  return variant;
+}
+
+SceneVariant of_fabric(const FabricVariant& fabric) {
+  SceneVariant variant;
+  variant.fabric = fabric;
+  return variant;
+}
+
+SceneVariant of_blend(const VisibilityBlend& blend) {
+  SceneVariant variant;
+  variant.blend = blend;
+  return variant;
+}
+
+}  // namespace
+
+std::vector<ChartRun> chart_runs(const SceneConfig& scene, const PictureRequest& base, const ChartLadders& ladders) {
+  const bool quick = ladders.quick;
+  const int spp = ladders.spp;
+  const PictureRequest exact = with(base, RenderMethod::kExact, spp);
+  const PictureRequest volume = with(base, RenderMethod::kVolume, spp);
+  using List = std::vector<int>;
+  std::vector<ChartRun> runs;
+
+  // Samples per pixel; the path tracer keeps two halves, so its numbers are even.
+  for (const int n : quick ? List{2, 8} : List{2, 4, 16, 64, 256}) {
+    runs.push_back({"path", spp_label(n), {{"spp", n}}, {}, with(base, RenderMethod::kPath, n)});
+  }
+  for (const int n : quick ? List{2, 8} : List{2, 4, 16, 64, 256}) {
+    runs.push_back({"path, local", spp_label(n), {{"spp", n}}, {}, local(with(base, RenderMethod::kPath, n))});
+  }
+  for (const int n : quick ? List{1, 4} : List{1, 4, 16, 64}) {
+    runs.push_back({"exact", spp_label(n), {{"spp", n}}, {}, with(base, RenderMethod::kExact, n)});
+  }
+  for (const int n : quick ? List{1, 4} : List{1, 4, 16, 64}) {
+    runs.push_back({"volume", spp_label(n), {{"spp", n}}, {}, with(base, RenderMethod::kVolume, n)});
+  }
+
+  // Spherical-harmonic order of the transfer.
+  for (const int order : quick ? List{} : List{0, 1, 2, 3, 4, 5}) {
+    runs.push_back({"exact, order of the transfer", fmt::format("order {}", order), {{"spp", spp}, {"order", order}},
+                    of_order(order), exact});
+  }
+  // Edge of a transfer cell.
+  for (const int factor : quick ? List{} : List{4, 2, 1}) {
+    runs.push_back({"exact, size of the cells", fmt::format("cells x {}", factor), {{"spp", spp}, {"cell_size", factor}},
+                    of_fabric({.cell_size = static_cast<double>(factor)}), exact});
+  }
+  // Form of visibility, where some light can tell.
+  const bool any_gaussian = std::any_of(scene.lights.begin(), scene.lights.end(),
+                                        [](const Light& light) { return !light.is_directional(); });
+  if (any_gaussian) {
+    const std::pair<const char*, VisibilityBlend> blends[] = {
+        {"Gaussians", kLobesOnly}, {"signed distance", kSignedDistanceOnly}, {"blend", {}}};
+    for (const auto& [name, blend] : blends) {
+      runs.push_back({"exact, form of visibility", name, {{"spp", spp}, {"visibility", name}}, of_blend(blend), exact});
+    }
+  }
+  // Voxels along a fiber's radius, of what the fabric says.
+  for (const double factor : quick ? std::vector<double>{0.5} : std::vector<double>{0.5, 1, 2}) {
+    runs.push_back({"volume, resolution", fmt::format("voxels x {}", factor), {{"spp", spp}, {"voxel_rate", factor}},
+                    of_fabric({.voxel_rate = factor}), volume});
+  }
+  return runs;
+}
+
+}  // namespace heddle
