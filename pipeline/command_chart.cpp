@@ -73,7 +73,7 @@ class ChartMaker {
 
   Chart make() {
     const std::vector<ChartRun> runs =
-        chart_runs(job_->config(), base_, {.quick = options_->quick, .spp = options_->quick ? 4 : 16});
+        chart_runs(job_->config(), base_, {.quick = options_->quick, .spp = options_->quick ? 4 : 64});
     for (const ReferenceKind kind : kReferenceKinds) make_reference(kind);
     for (const ChartRun& run : runs) {
       stop_if_interrupted();

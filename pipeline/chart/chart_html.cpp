@@ -51,7 +51,7 @@ button.chosen { background: #222; color: #fff; }
 #detail { display: flex; flex-wrap: wrap; gap: 1.2em; align-items: flex-start; margin: .6em 0 1.4em; padding: 1em; background: #f4f4f2;
           min-height: 17em; }
 figure { margin: 0; }
-figure img { image-rendering: pixelated; width: 288px; background: #ddd; display: block; }
+figure img { image-rendering: pixelated; width: 252px; background: #ddd; display: block; }
 figcaption { font-size: .9em; color: #555; }
 #facts td { padding: 0 .9em .1em 0; vertical-align: top; }
 #facts td:first-child { color: #666; }
@@ -70,7 +70,7 @@ const chart = JSON.parse(document.getElementById('chart').textContent);
 const images = JSON.parse(document.getElementById('images').textContent);
 let reference = 'full', chosen = chart.rows.findIndex(row => row.status === 'done');
 const all = selector => Array.from(document.querySelectorAll(selector));
-const percent = value => (100 * value).toPrecision(3) + ' %';
+const percent = value => (value >= 1 ? (100 * value).toFixed(0) : (100 * value).toPrecision(3)) + ' %';
 const seconds = value => value === null ? 'unknown' : value >= 1 ? value.toPrecision(4) + ' s' : (1000 * value).toPrecision(3) + ' ms';
 const cell = (parent, text, name) => {
   const element = parent.insertCell();

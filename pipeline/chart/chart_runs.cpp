@@ -75,15 +75,19 @@ std::vector<ChartRun> chart_runs(const SceneConfig& scene, const PictureRequest&
                     of_fabric({.cell_size = static_cast<double>(factor)}), exact});
   }
   // Form of visibility, where some light can tell.
-  const bool any_gaussian = std::any_of(scene.lights.begin(), scene.lights.end(),
-                                        [](const Light& light) { return !light.is_directional(); });
-  if (any_gaussian) {
-    const std::pair<const char*, VisibilityBlend> blends[] = {
-        {"Gaussians", kLobesOnly}, {"signed distance", kSignedDistanceOnly}, {"blend", {}}};
-    for (const auto& [name, blend] : blends) {
-      runs.push_back({"exact, form of visibility", name, {{"spp", spp}, {"visibility", name}}, of_blend(blend), exact});
-    }
+  const auto any_gaussian = [&scene](auto&& condition) {
+    return std::any_of(scene.lights.begin(), scene.lights.end(),
+                       [&](const Light& light) { return !light.is_directional() && condition(light.sharpness); });
+  };
+  const VisibilityBlend usual;
+  const auto add_blend = [&](const char* name, const VisibilityBlend& blend) {
+    runs.push_back({"exact, form of visibility", name, {{"spp", spp}, {"visibility", name}}, of_blend(blend), exact});
+  };
+  if (any_gaussian([&](float sharpness) { return usual.uses_distance(sharpness); })) add_blend("Gaussians", kLobesOnly);
+  if (any_gaussian([&](float sharpness) { return usual.uses_lobes(sharpness); })) {
+    add_blend("signed distance", kSignedDistanceOnly);
   }
+  if (any_gaussian([](float) { return true; })) add_blend("blend", usual);
   // Voxels along a fiber's radius, of what the fabric says.
   for (const double factor : quick ? std::vector<double>{0.5} : std::vector<double>{0.5, 1, 2}) {
     runs.push_back({"volume, resolution", fmt::format("voxels x {}", factor), {{"spp", spp}, {"voxel_rate", factor}},

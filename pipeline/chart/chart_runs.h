@@ -22,11 +22,12 @@ struct ChartRun {
 
 struct ChartLadders {
   bool quick = false;  // one or two rungs each, and none that needs a transfer of its own
-  int spp = 16;        // of curves along which something else changes
+  int spp = 64;        // of curves along which something else changes: noise must not hide it
 };
 
 /// base: camera, crop and seed of the picture. Runs of one method lie together, from its cheapest setting to its dearest
-/// where that is known beforehand; scenes without Gaussian lights have no curve over forms of visibility.
+/// where that is known beforehand; forms of visibility are there where
+/// some light of the scene can tell them apart.
 std::vector<ChartRun> chart_runs(const SceneConfig& scene, const PictureRequest& base, const ChartLadders& ladders);
 
 }  // namespace heddle

@@ -19,9 +19,9 @@ constexpr double kLegendTop = kPanelTop + kPanelHeight + 74;
 constexpr double kLegendRow = 22;
 constexpr int kLegendColumns = 4;
 
-// Okabe and Ito's colours, told apart by colour-blind eyes as well; a second round gets other shapes.
-constexpr std::array<const char*, 7> kColors = {"#000000", "#0072b2", "#d55e00", "#009e73",
-                                                "#cc79a7", "#56b4e9", "#e69f00"};
+// Okabe and Ito's colours, told apart by colour-blind eyes as well, and two more; a second round gets other shapes.
+constexpr std::array<const char*, 9> kColors = {"#000000", "#0072b2", "#d55e00", "#009e73", "#cc79a7",
+                                                "#56b4e9", "#e69f00", "#7a4a21", "#6a3d9a"};
 
 /// A decimal axis: value to place.
 struct LogAxis {
