@@ -5,6 +5,7 @@
 // processes may share a cache: two that build the same key write the same bytes, and the last rename wins.
 //
 //   CACHE/STAGE/KEY.safetensors (or .vdb, or a folder KEY/)    the artifact
+//   CACHE/STAGE/KEY.cost.json                                  what it took to build it (stages.h, StageCost)
 //   CACHE/STAGE/KEY.partial/FIRST.safetensors                  finished chunks of a long stage, kept until it is published
 //
 // Default folder: $HEDDLE_CACHE, else out/cache below the working directory.

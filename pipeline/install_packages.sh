@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Installs what the program and its tests need on Debian 12; the only list of packages. Does nothing where all of them are
-# there already.
+# Installs what the program and its tests need on Debian 12; the only list of packages. With --tests also the browser in which a
+# test opens the page of a chart. Does nothing where all of them are there already.
 set -euo pipefail
 
 packages=(
@@ -9,6 +9,8 @@ packages=(
   libtomlplusplus-dev libcli11-dev nlohmann-json3-dev libfmt-dev libpng-dev zlib1g-dev libxxhash-dev
   libgtest-dev libbenchmark-dev python3 python3-numpy
 )
+
+[[ ${1:-} == --tests ]] && packages+=(chromium)
 
 missing=()
 for package in "${packages[@]}"; do

@@ -143,9 +143,8 @@ std::string SceneJob::picture_key(const PictureRequest& request) {
 }
 
 const SceneJob::Loaded& SceneJob::loaded_for(RenderMethod method) {
-  std::unique_ptr<Loaded>& loaded = loaded_[method];
-  if (loaded) return *loaded;
-  loaded = std::make_unique<Loaded>();
+  if (const auto found = loaded_.find(method); found != loaded_.end()) return *found->second;
+  auto loaded = std::make_unique<Loaded>();
   const std::vector<Artifact> artifacts = packs_for(method);
   std::size_t k = 0;
   for (const auto& [file, stages] : fabrics_) {
@@ -157,7 +156,7 @@ const SceneJob::Loaded& SceneJob::loaded_for(RenderMethod method) {
     if (!cloth.surface) tiles.push_back(loaded->tiles.at(cloth.fabric));
   }
   loaded->scene.reset(new ClothScene(make_cloth_scene(config_, tiles)));  // cannot be moved: built in place
-  return *loaded;
+  return *loaded_.emplace(method, std::move(loaded)).first->second;
 }
 
 PictureResult SceneJob::render(const PictureRequest& request, const std::string& title) {

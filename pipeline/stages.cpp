@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <utility>
@@ -125,20 +126,20 @@ FabricDocument read_fabric_document(const fs::path& path, std::optional<std::uin
     }
     return section;
   };
-  // As if the config said so.
-  const auto change = [](nlohmann::json& section, const char* name, const char* key, double& value, double factor) {
+  // As if the config said so: canonical text writes whole numbers without a point.
+  const auto change = [](nlohmann::json& section, const char* key, double& value, double factor) {
     if (factor == 1) return;
     value *= factor;
     section["set"][key] = value;
-    section["defaults"].erase(fmt::format("{}.{}", name, key));
+    if (value == std::round(value)) section["set"][key] = static_cast<std::int64_t>(value);
   };
   fabric.visibility_text = take_section("visibility").dump();
   nlohmann::json transfer = take_section("transfer");
-  change(transfer, "transfer", "cell_mean_free_paths", fabric.transfer.cell_mean_free_paths, variant.cell_size);
+  change(transfer, "cell_mean_free_paths", fabric.transfer.cell_mean_free_paths, variant.cell_size);
   transfer["set"].erase("order");  // part of the key on its own
   fabric.transfer_text = transfer.dump();
   nlohmann::json volume = take_section("volume");
-  change(volume, "volume", "voxels_per_radius", fabric.volume.voxels_per_radius, variant.voxel_rate);
+  change(volume, "voxels_per_radius", fabric.volume.voxels_per_radius, variant.voxel_rate);
   fabric.volume_text = volume.dump();
   cloth.erase("name");
   cloth.erase("light_from");

@@ -3,7 +3,7 @@
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
-bash pipeline/install_packages.sh
+bash pipeline/install_packages.sh --tests
 cmake --preset release >/dev/null
 cmake --build build/release
 ctest --test-dir build/release --output-on-failure -j "$(nproc)" "$@"

@@ -64,6 +64,10 @@ std::vector<ChartRun> chart_runs(const SceneConfig& scene, const PictureRequest&
     runs.push_back({"volume", spp_label(n), {{"spp", n}}, {}, with(base, RenderMethod::kVolume, n)});
   }
 
+  const bool any_fibers = std::any_of(scene.cloths.begin(), scene.cloths.end(),
+                                      [](const ClothConfig& cloth) { return !cloth.surface; });
+  if (!any_fibers) return runs;  // nothing below changes surface models
+
   // Spherical-harmonic order of the transfer.
   for (const int order : quick ? List{} : List{0, 1, 2, 3, 4, 5}) {
     runs.push_back({"exact, order of the transfer", fmt::format("order {}", order), {{"spp", spp}, {"order", order}},
