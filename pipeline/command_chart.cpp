@@ -138,7 +138,8 @@ class ChartMaker {
     PictureResult picture;
     for (int n = 0; n < (repeat ? kRepeats : 1) && (n == 0 || spent.seconds < kLongEnough); ++n) {
       picture = job_->render(request, title);
-      const WorkTime time = {picture.report.at("seconds").get<double>(), picture.report.at("core_seconds").get<double>()};
+      const WorkTime time = {picture.report.at("seconds").get<double>(),
+                             picture.report.at("core_seconds").get<double>()};
       if (n == 0 || time.seconds < best.seconds) best = time;
       spent = spent + time;
     }
@@ -166,8 +167,8 @@ class ChartMaker {
     // Not the runs' own random numbers: errors would look smaller than they are.
     reference.request.seed = base_.seed + 1;
     reference.key = job_->picture_key(reference.request);
-    const Json record = provide(reference.request, reference.key,
-                                fmt::format("{} reference", reference_name(kind)), false);
+    const Json record =
+        provide(reference.request, reference.key, fmt::format("{} reference", reference_name(kind)), false);
     reference.seconds = record.at("render_seconds").get<double>();
     reference.core_seconds = record.at("render_core_seconds").get<double>();
     reference.picture = in_folder(reference.key + ".png");
@@ -225,7 +226,8 @@ class ChartMaker {
     const int height = chart_.crop.height;
     const int edge = std::clamp(static_cast<int>(std::sqrt(width * height / kBlocks)), 1, kLargestBlock);
     const auto is_finite = [](const Rgb& color) { return color.isFinite().all(); };
-    if (!std::all_of(colors.begin(), colors.end(), is_finite)) throw std::runtime_error("the picture holds NaN or infinity");
+    if (!std::all_of(colors.begin(), colors.end(), is_finite))
+      throw std::runtime_error("the picture holds NaN or infinity");
     row.error[k].estimate = estimate_error(colors, {expected.half0, expected.half1}, width, height, edge);
     row.error[k].flip = flip_error(colors, expected.colors, width, height);
     double mean = 0;
@@ -243,7 +245,8 @@ class ChartMaker {
       return;
     }
     if (!row.precompute_seconds) {
-      context_->console->warn(fmt::format("{}: the cache does not say how long its data took; total time left out", name));
+      context_->console->warn(
+          fmt::format("{}: the cache does not say how long its data took; total time left out", name));
     }
     const PictureErrorEstimate& estimate = row.error[0].estimate;
     context_->console->say(fmt::format("{}: {:.3g} s, relative RMSE {:.2f} % ({:.2f} to {:.2f})", name,

@@ -17,7 +17,7 @@ constexpr double kFeatureExponent = 0.5;
 constexpr double kFeatureWidth = 0.082;
 
 const Mat3d kXyzFromLinear = (Mat3d() << 0.4123908, 0.3575843, 0.1804808,  //
-                              0.2126390, 0.7151687, 0.0721923,            //
+                              0.2126390, 0.7151687, 0.0721923,             //
                               0.0193308, 0.1191948, 0.9505322)
                                  .finished();
 const Mat3d kLinearFromXyz = kXyzFromLinear.inverse();
@@ -73,7 +73,8 @@ Kernel contrast_kernel(double pixels_per_degree) {
   struct Gaussians {
     double a1, b1, a2, b2;
   };
-  constexpr std::array<Gaussians, 3> kSensitivity = {{{1, 0.0047, 0, 1e-5}, {1, 0.0053, 0, 1e-5}, {34.1, 0.04, 13.5, 0.025}}};
+  constexpr std::array<Gaussians, 3> kSensitivity = {
+      {{1, 0.0047, 0, 1e-5}, {1, 0.0053, 0, 1e-5}, {34.1, 0.04, 13.5, 0.025}}};
   const double widest = kSensitivity[2].b1;
   const int radius = static_cast<int>(std::ceil(3 * std::sqrt(widest / (2 * kPi * kPi)) * pixels_per_degree));
   Kernel kernel = make_kernel(radius, [&](int x, int y) {

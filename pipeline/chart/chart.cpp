@@ -13,7 +13,9 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json list(const Rgbd& color) { return {color[0], color[1], color[2]}; }
+Json list(const Rgbd& color) {
+  return {color[0], color[1], color[2]};
+}
 
 template <class Value>
 Json or_null(const std::optional<Value>& value) {
@@ -84,7 +86,9 @@ std::string csv_field(const Json& value) {
 
 }  // namespace
 
-const char* reference_name(ReferenceKind kind) { return kind == ReferenceKind::kFull ? "full" : "local"; }
+const char* reference_name(ReferenceKind kind) {
+  return kind == ReferenceKind::kFull ? "full" : "local";
+}
 
 std::vector<bool> pareto_front(std::span<const CostAndError> points) {
   std::vector<std::size_t> order;
@@ -125,15 +129,16 @@ void mark_fronts(Chart& chart) {
 }
 
 Json chart_json(const Chart& chart) {
-  Json json = {{"format", "heddle chart"},
-               {"version", 1},
-               {"program_version", kProgramVersion},
-               {"scene", {{"name", chart.scene}, {"file", chart.scene_file}, {"view", chart.view}}},
-               {"picture",
-                {{"width", chart.width},
-                 {"height", chart.height},
-                 {"crop", {chart.crop.x0, chart.crop.y0, chart.crop.x0 + chart.crop.width, chart.crop.y0 + chart.crop.height}}}},
-               {"machine", {{"processor", chart.processor}, {"threads", chart.threads}}}};
+  Json json = {
+      {"format", "heddle chart"},
+      {"version", 1},
+      {"program_version", kProgramVersion},
+      {"scene", {{"name", chart.scene}, {"file", chart.scene_file}, {"view", chart.view}}},
+      {"picture",
+       {{"width", chart.width},
+        {"height", chart.height},
+        {"crop", {chart.crop.x0, chart.crop.y0, chart.crop.x0 + chart.crop.width, chart.crop.y0 + chart.crop.height}}}},
+      {"machine", {{"processor", chart.processor}, {"threads", chart.threads}}}};
   for (const ReferenceKind kind : kReferenceKinds) {
     const ChartReference& reference = chart.references[static_cast<std::size_t>(kind)];
     json["references"][reference_name(kind)] = {{"key", reference.key},
@@ -154,19 +159,31 @@ Json chart_json(const Chart& chart) {
 std::string chart_csv(const Chart& chart) {
   const Json rows = chart_json(chart).at("rows");
   std::string text;
-  const auto add = [&text](const std::vector<std::string>& fields) { text += fmt::format("{}\n", fmt::join(fields, ",")); };
-  const std::vector<std::string> plain = {"method",          "label",      "status",        "message",
-                                          "key",             "seed",       "program_version", "threads",
-                                          "precompute_seconds", "precompute_core_seconds", "render_seconds",
-                                          "render_core_seconds", "total_seconds"};
-  const std::vector<std::string> measured = {"relative_rmse", "relative_rmse_low", "relative_rmse_high", "percentile99", "flip",
-                                             "front_render", "front_total"};
+  const auto add = [&text](const std::vector<std::string>& fields) {
+    text += fmt::format("{}\n", fmt::join(fields, ","));
+  };
+  const std::vector<std::string> plain = {"method",
+                                          "label",
+                                          "status",
+                                          "message",
+                                          "key",
+                                          "seed",
+                                          "program_version",
+                                          "threads",
+                                          "precompute_seconds",
+                                          "precompute_core_seconds",
+                                          "render_seconds",
+                                          "render_core_seconds",
+                                          "total_seconds"};
+  const std::vector<std::string> measured = {"relative_rmse", "relative_rmse_low", "relative_rmse_high", "percentile99",
+                                             "flip",          "front_render",      "front_total"};
   const char* const channels[] = {"r", "g", "b"};
   std::vector<std::string> names = plain;
   names.insert(names.begin() + 2, "settings");
   for (const ReferenceKind kind : kReferenceKinds) {
     for (const std::string& name : measured) names.push_back(fmt::format("{}_{}", reference_name(kind), name));
-    for (const char* channel : channels) names.push_back(fmt::format("{}_color_ratio_{}", reference_name(kind), channel));
+    for (const char* channel : channels)
+      names.push_back(fmt::format("{}_color_ratio_{}", reference_name(kind), channel));
   }
   add(names);
   for (const Json& row : rows) {

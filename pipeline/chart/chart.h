@@ -35,15 +35,15 @@ struct ChartRow {
   std::string key;      // of the picture; empty where the run failed before it was known
   std::string message;  // why the run failed; empty where it did not
   std::string program_version;
-  std::vector<StageCost> stages;              // precomputed data that the run needs
-  std::optional<double> precompute_seconds;   // sums over the stages; empty where one has no record
+  std::vector<StageCost> stages;             // precomputed data that the run needs
+  std::optional<double> precompute_seconds;  // sums over the stages; empty where one has no record
   std::optional<double> precompute_core_seconds;
   double render_seconds = 0;
   double render_core_seconds = 0;
   int threads = 0;
-  ChartError error[2];      // [ReferenceKind]
-  bool front_render[2] = {};  // [ReferenceKind] on the Pareto front of render time against error
-  bool front_total[2] = {};   // [ReferenceKind] the same with the precomputation counted
+  ChartError error[2];                  // [ReferenceKind]
+  bool front_render[2] = {};            // [ReferenceKind] on the Pareto front of render time against error
+  bool front_total[2] = {};             // [ReferenceKind] the same with the precomputation counted
   std::filesystem::path picture;        // .png, from the chart's folder; so are the differences
   std::filesystem::path difference[2];  // [ReferenceKind]
 

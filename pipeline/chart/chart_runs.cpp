@@ -20,7 +20,9 @@ PictureRequest local(PictureRequest request) {
   return request;
 }
 
-std::string spp_label(int spp) { return fmt::format("{} spp", spp); }
+std::string spp_label(int spp) {
+  return fmt::format("{} spp", spp);
+}
 
 SceneVariant of_order(int order) {
   SceneVariant variant;
@@ -64,19 +66,25 @@ std::vector<ChartRun> chart_runs(const SceneConfig& scene, const PictureRequest&
     runs.push_back({"volume", spp_label(n), {{"spp", n}}, {}, with(base, RenderMethod::kVolume, n)});
   }
 
-  const bool any_fibers = std::any_of(scene.cloths.begin(), scene.cloths.end(),
-                                      [](const ClothConfig& cloth) { return !cloth.surface; });
+  const bool any_fibers =
+      std::any_of(scene.cloths.begin(), scene.cloths.end(), [](const ClothConfig& cloth) { return !cloth.surface; });
   if (!any_fibers) return runs;  // nothing below changes surface models
 
   // Spherical-harmonic order of the transfer.
   for (const int order : quick ? List{} : List{0, 1, 2, 3, 4, 5}) {
-    runs.push_back({"exact, order of the transfer", fmt::format("order {}", order), {{"spp", spp}, {"order", order}},
-                    of_order(order), exact});
+    runs.push_back({"exact, order of the transfer",
+                    fmt::format("order {}", order),
+                    {{"spp", spp}, {"order", order}},
+                    of_order(order),
+                    exact});
   }
   // Edge of a transfer cell.
   for (const int factor : quick ? List{} : List{4, 2, 1}) {
-    runs.push_back({"exact, size of the cells", fmt::format("cells x {}", factor), {{"spp", spp}, {"cell_size", factor}},
-                    of_fabric({.cell_size = static_cast<double>(factor)}), exact});
+    runs.push_back({"exact, size of the cells",
+                    fmt::format("cells x {}", factor),
+                    {{"spp", spp}, {"cell_size", factor}},
+                    of_fabric({.cell_size = static_cast<double>(factor)}),
+                    exact});
   }
   // Form of visibility, where some light can tell.
   const auto any_gaussian = [&scene](auto&& condition) {
@@ -94,8 +102,11 @@ std::vector<ChartRun> chart_runs(const SceneConfig& scene, const PictureRequest&
   if (any_gaussian([](float) { return true; })) add_blend("blend", usual);
   // Voxels along a fiber's radius, of what the fabric says.
   for (const double factor : quick ? std::vector<double>{0.5} : std::vector<double>{0.5, 1, 2}) {
-    runs.push_back({"volume, resolution", fmt::format("voxels x {}", factor), {{"spp", spp}, {"voxel_rate", factor}},
-                    of_fabric({.voxel_rate = factor}), volume});
+    runs.push_back({"volume, resolution",
+                    fmt::format("voxels x {}", factor),
+                    {{"spp", spp}, {"voxel_rate", factor}},
+                    of_fabric({.voxel_rate = factor}),
+                    volume});
   }
   return runs;
 }

@@ -55,7 +55,9 @@ std::vector<Tick> ticks_of(const LogAxis& axis) {
   return ticks;
 }
 
-std::string percent_text(double value) { return fmt::format("{:g} %", 100 * value); }
+std::string percent_text(double value) {
+  return fmt::format("{:g} %", 100 * value);
+}
 
 std::string seconds_text(double value) {
   if (value < 0.9995) return fmt::format("{:g} ms", 1000 * value);
@@ -113,10 +115,11 @@ class ChartDrawing {
         "\n<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n",
         kWidth, height, kWidth, height);
     const ReferenceKind kind = kReferenceKinds[kind_];
-    add(fmt::format(R"(<text x="{:.0f}" y="26" font-size="17" font-weight="600">{}</text>)", kPanelLeft[0],
-                    xml_text(fmt::format("{}: error against {}", chart_.scene,
-                                         kind == ReferenceKind::kFull ? "the path-traced reference"
-                                                                      : "the reference without light between shells"))));
+    add(fmt::format(
+        R"(<text x="{:.0f}" y="26" font-size="17" font-weight="600">{}</text>)", kPanelLeft[0],
+        xml_text(fmt::format("{}: error against {}", chart_.scene,
+                             kind == ReferenceKind::kFull ? "the path-traced reference"
+                                                          : "the reference without light between shells"))));
     panel(0, "time to render");
     panel(1, "time to precompute and render");
     legend();
@@ -179,8 +182,8 @@ class ChartDrawing {
     }
     add(fmt::format(R"(<rect x="{:.1f}" y="{:.1f}" width="{:.1f}" height="{:.1f}" fill="none" stroke="#888"/>)", left,
                     kPanelTop, kPanelWidth, kPanelHeight));
-    add(fmt::format(R"(<text x="{:.1f}" y="{:.1f}" text-anchor="middle" font-size="13">{}</text>)",
-                    (left + right) / 2, bottom + 42, title));
+    add(fmt::format(R"(<text x="{:.1f}" y="{:.1f}" text-anchor="middle" font-size="13">{}</text>)", (left + right) / 2,
+                    bottom + 42, title));
     if (which == 0) {
       add(fmt::format(R"~(<text transform="translate({:.1f} {:.1f}) rotate(-90)" text-anchor="middle" font-size="13">)~"
                       "relative RMSE</text>",
@@ -233,8 +236,9 @@ class ChartDrawing {
     // Hollow: not told from an error of zero.
     const char* fill = estimate.rmse_low > 0 ? color(method) : "#fff";
     add(fmt::format(R"(<g class="point" data-row="{}" tabindex="0">)", point.row));
-    add(fmt::format("<title>{}</title>", xml_text(fmt::format("{}, {}: {:.3g} % in {:.3g} s", row.run.method,
-                                                              row.run.label, 100 * estimate.relative_rmse, point.cost))));
+    add(fmt::format("<title>{}</title>",
+                    xml_text(fmt::format("{}, {}: {:.3g} % in {:.3g} s", row.run.method, row.run.label,
+                                         100 * estimate.relative_rmse, point.cost))));
     add(fmt::format(R"(<path d="M{0:.1f} {1:.1f}V{2:.1f}M{3:.1f} {1:.1f}h6M{3:.1f} {2:.1f}h6" stroke="{4}" )"
                     R"(stroke-width="1.2" fill="none"/>)",
                     x, low, high, x - 3, color(method)));
@@ -259,9 +263,9 @@ class ChartDrawing {
       const double width = 6.2 * static_cast<double>(text.size());
       const double x = cost_axis.place(point.cost);
       const double y = error_axis_.place(point.error);
-      const std::array<Box, 4> places = {Box{x + 8, y - 16, x + 8 + width, y - 4}, Box{x - 8 - width, y + 4, x - 8, y + 16},
-                                         Box{x + 8, y + 4, x + 8 + width, y + 16},
-                                         Box{x - 8 - width, y - 16, x - 8, y - 4}};
+      const std::array<Box, 4> places = {
+          Box{x + 8, y - 16, x + 8 + width, y - 4}, Box{x - 8 - width, y + 4, x - 8, y + 16},
+          Box{x + 8, y + 4, x + 8 + width, y + 16}, Box{x - 8 - width, y - 16, x - 8, y - 4}};
       for (const Box& box : places) {
         const bool inside = box.x0 > right - kPanelWidth && box.x1 < right && box.y1 < kPanelTop + kPanelHeight;
         const bool is_free = std::none_of(taken.begin(), taken.end(), [&](const Box& other) {
@@ -285,12 +289,13 @@ class ChartDrawing {
       add(marker(shape(method), x, y, fmt::format(R"(fill="{0}" stroke="{0}")", color(method))));
       add(fmt::format(R"(<text x="{:.1f}" y="{:.1f}">{}</text>)", x + 12, y + 4, xml_text(methods_[method])));
     }
-    const auto failed = std::count_if(chart_.rows.begin(), chart_.rows.end(),
-                                      [](const ChartRow& row) { return !row.done(); });
+    const auto failed =
+        std::count_if(chart_.rows.begin(), chart_.rows.end(), [](const ChartRow& row) { return !row.done(); });
     const double y = kLegendTop + kLegendRow * std::ceil(static_cast<double>(methods_.size()) / kLegendColumns) + 6;
     const ChartReference& reference = chart_.references[kind_];
     std::string note = fmt::format(
-        "Yellow: Pareto front. Bars: 95 % intervals. Hollow: not told from no error. Reference: {} spp in two halves (its noise, "
+        "Yellow: Pareto front. Bars: 95 % intervals. Hollow: not told from no error. Reference: {} spp in two halves "
+        "(its noise, "
         "{:.2g} %, does not count). {} threads.",
         reference.request.spp, 100 * reference.noise.rms, chart_.threads);
     if (failed > 0) note += fmt::format(" Runs that failed: {}.", failed);
@@ -306,6 +311,8 @@ class ChartDrawing {
 
 }  // namespace
 
-std::string chart_svg(const Chart& chart, ReferenceKind kind) { return ChartDrawing(chart, kind).text(); }
+std::string chart_svg(const Chart& chart, ReferenceKind kind) {
+  return ChartDrawing(chart, kind).text();
+}
 
 }  // namespace heddle

@@ -69,7 +69,9 @@ TEST(ChartLaw, PointsThatAreNotFiniteAreOnNoFront) {
   EXPECT_TRUE(pareto_front({}).empty());
 }
 
-TEST(Chart, TextForMarkup) { EXPECT_EQ(xml_text("a<b> & \"c\""), "a&lt;b&gt; &amp; &quot;c&quot;"); }
+TEST(Chart, TextForMarkup) {
+  EXPECT_EQ(xml_text("a<b> & \"c\""), "a&lt;b&gt; &amp; &quot;c&quot;");
+}
 
 TEST(Chart, WorkTimeCountsCoresAndWalls) {
   const Stopwatch watch;
@@ -137,9 +139,11 @@ TEST(Chart, LaddersHoldEverySetting) {
   const std::vector<ChartRun> runs = chart_runs(scene_of_fibers(), {}, {});
   EXPECT_EQ(labels_of(runs, "path").size(), 5U);
   EXPECT_EQ(labels_of(runs, "exact, order of the transfer").size(), 6U);
-  EXPECT_EQ(labels_of(runs, "exact, size of the cells"), (std::vector<std::string>{"cells x 4", "cells x 2", "cells x 1"}));
+  EXPECT_EQ(labels_of(runs, "exact, size of the cells"),
+            (std::vector<std::string>{"cells x 4", "cells x 2", "cells x 1"}));
   for (const ChartRun& run : runs) {
-    EXPECT_TRUE(run.request.method != RenderMethod::kPath || run.request.spp % 2 == 0) << "a path tracer keeps two halves";
+    EXPECT_TRUE(run.request.method != RenderMethod::kPath || run.request.spp % 2 == 0)
+        << "a path tracer keeps two halves";
     EXPECT_EQ(run.request.local, run.method == "path, local");
     EXPECT_EQ(run.settings.at("spp"), run.request.spp);
     EXPECT_EQ(run.settings.contains("order"), run.variant.order.has_value());
@@ -248,7 +252,8 @@ TEST_F(ChartEndToEnd, RowsAreCompleteAndSorted) {
   }
   EXPECT_EQ(static_cast<std::size_t>(std::count(csv.begin(), csv.end(), '\n')), json.at("rows").size() + 1);
   const std::string names = csv.substr(0, csv.find('\n'));
-  for (const char* name : {"method", "settings", "key", "seed", "program_version", "full_relative_rmse", "local_flip"}) {
+  for (const char* name :
+       {"method", "settings", "key", "seed", "program_version", "full_relative_rmse", "local_flip"}) {
     EXPECT_NE(names.find(name), std::string::npos) << name;
   }
   EXPECT_NE(csv.find("\"path, local\",2 spp,spp=2,done"), std::string::npos);
@@ -370,13 +375,15 @@ TEST_F(ChartEndToEnd, ScriptOfThePageRunsInChromium) {
   EXPECT_EQ(html.find("tiny <swatch>"), std::string::npos);
 
   if (command_status("command -v chromium >/dev/null") != 0) {
-    const std::string reason = "not run: no chromium on this machine (pipeline/install_packages.sh --tests installs it)";
+    const std::string reason =
+        "not run: no chromium on this machine (pipeline/install_packages.sh --tests installs it)";
     if (std::getenv("CI") != nullptr) FAIL() << reason;
     GTEST_SKIP() << reason;
   }
-  const std::string command = "timeout 60 chromium --headless --no-sandbox --disable-gpu --user-data-dir=" +
-                              path("profile").string() + " --dump-dom file://" +
-                              (path("chart") / "index.html").string() + " > " + path("dom.html").string() + " 2>/dev/null";
+  const std::string command =
+      "timeout 60 chromium --headless --no-sandbox --disable-gpu --user-data-dir=" + path("profile").string() +
+      " --dump-dom file://" + (path("chart") / "index.html").string() + " > " + path("dom.html").string() +
+      " 2>/dev/null";
   ASSERT_EQ(command_status(command), 0);
   const std::string dom = text_of(path("dom.html"));
   const auto count_of = [&dom](const std::string& pattern) {

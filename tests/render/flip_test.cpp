@@ -14,7 +14,9 @@ constexpr int kWidth = 40;
 constexpr int kHeight = 32;
 using Picture = std::vector<Rgb>;
 
-Picture uniform_picture(const Rgb& color) { return Picture(kWidth * kHeight, color); }
+Picture uniform_picture(const Rgb& color) {
+  return Picture(kWidth * kHeight, color);
+}
 
 Picture noise_picture(std::uint64_t seed) {
   RandomStream random(seed, RandomStage::kTest, 0, 0);
@@ -25,7 +27,9 @@ Picture noise_picture(std::uint64_t seed) {
   return picture;
 }
 
-double flip(const Picture& a, const Picture& b) { return flip_error(a, b, kWidth, kHeight); }
+double flip(const Picture& a, const Picture& b) {
+  return flip_error(a, b, kWidth, kHeight);
+}
 
 TEST(FlipLaw, IdenticalPicturesDoNotDiffer) {
   EXPECT_EQ(flip(noise_picture(1), noise_picture(1)), 0);
@@ -81,8 +85,7 @@ TEST(FlipLaw, GreysFollowTheirLightness) {
   const auto lightness = [](double y) { return 116 * std::cbrt(y) - 16; };
   const double small = flip(uniform_picture(Rgb(0.2F, 0.2F, 0.2F)), uniform_picture(Rgb(0.21F, 0.21F, 0.21F)));
   const double large = flip(uniform_picture(Rgb(0.2F, 0.2F, 0.2F)), uniform_picture(Rgb(0.25F, 0.25F, 0.25F)));
-  const double expected =
-      std::pow((lightness(0.25) - lightness(0.2)) / (lightness(0.21) - lightness(0.2)), 0.7);
+  const double expected = std::pow((lightness(0.25) - lightness(0.2)) / (lightness(0.21) - lightness(0.2)), 0.7);
   EXPECT_NEAR(large / small, expected, 1e-3 * expected);
 }
 
