@@ -89,7 +89,10 @@ std::vector<ChartRun> chart_runs(const SceneConfig& scene, const PictureRequest&
   // Form of visibility, where some light can tell.
   const auto any_gaussian = [&scene](auto&& condition) {
     return std::any_of(scene.lights.begin(), scene.lights.end(),
-                       [&](const Light& light) { return !light.is_directional() && condition(light.sharpness); });
+                       [&](const Light& light) {  // Gaussians that stand for an environment may be sharp and soft.
+                         if (light.type == LightType::kEnvironment) return true;
+                         return !light.is_directional() && condition(light.sharpness);
+                       });
   };
   const VisibilityBlend usual;
   const auto add_blend = [&](const char* name, const VisibilityBlend& blend) {
