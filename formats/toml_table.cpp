@@ -485,7 +485,7 @@ std::string TomlTable::string(std::string_view key, std::optional<std::string> f
   return text->get();
 }
 
-std::string TomlTable::choice(std::string_view key, std::initializer_list<std::string_view> choices,
+std::string TomlTable::choice(std::string_view key, const std::vector<std::string_view>& choices,
                               std::optional<std::string> fallback) const {
   assert(!fallback || std::find(choices.begin(), choices.end(), *fallback) != choices.end());
   node_->record(key, "string", fmt::format("{}", fmt::join(choices, " | ")),

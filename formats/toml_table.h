@@ -54,7 +54,7 @@ class TomlTable {
   bool boolean(std::string_view key, std::optional<bool> fallback = {}) const;
   std::string string(std::string_view key, std::optional<std::string> fallback = {}) const;
   /// A string out of a fixed set; the error lists the set.
-  std::string choice(std::string_view key, std::initializer_list<std::string_view> choices,
+  std::string choice(std::string_view key, const std::vector<std::string_view>& choices,
                      std::optional<std::string> fallback = {}) const;
   std::array<double, 2> number2(std::string_view key, NumberRange range,
                                 std::optional<std::array<double, 2>> fallback = {}) const;

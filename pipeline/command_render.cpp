@@ -15,12 +15,13 @@ void apply_overrides(const RenderOptions& options, PictureRequest& request) {
   if (!options.method.empty()) request.method = *render_method_of(options.method);
   if (options.spp) request.spp = *options.spp;
   if (!options.crop.empty()) request.crop = parse_crop(options.crop, request.camera);
-  const bool path = request.method == RenderMethod::kPath;
-  if (!path && (options.seconds || options.local || options.bounces || !options.estimator.empty())) {
-    throw ConfigError("--seconds, --local, --bounces and --estimator belong to --method path");
+  const bool path = traces_paths(request.method);
+  if (!path && (options.seconds || options.local || !options.estimator.empty())) {
+    throw ConfigError("--seconds, --local and --estimator belong to --method path or path-6");
   }
+  if (request.method != RenderMethod::kPath && options.bounces) throw ConfigError("--bounces belongs to --method path");
   if (path && request.spp % 2 != 0)
-    throw ConfigError("--spp: expected an even number for --method path: it keeps two halves");
+    throw ConfigError("--spp: expected an even number where paths are traced: they keep two halves");
   static const std::map<std::string, LightEstimator> estimators = {{"", LightEstimator::kCombined},
                                                                    {"mis", LightEstimator::kCombined},
                                                                    {"light", LightEstimator::kShadowRays},

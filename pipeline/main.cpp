@@ -8,6 +8,9 @@
 #include <iostream>
 #include <map>
 #include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
 
 #include "formats/input_error.h"
 #include "pipeline/cache.h"
@@ -15,9 +18,15 @@
 #include "pipeline/eval/eval.h"
 #include "pipeline/interrupt.h"
 #include "pipeline/version.h"
+#include "render/scene_config.h"
 
 namespace heddle {
 namespace {
+
+std::vector<std::string> method_names() {
+  const std::vector<std::string_view> names = render_method_names();
+  return {names.begin(), names.end()};
+}
 
 constexpr int kFailed = 1;
 constexpr int kWrongUsage = 2;
@@ -120,7 +129,7 @@ std::map<std::string, std::function<int()>> add_commands(CLI::App& app, Options&
       ->required();
   render->add_option("--view", picture.view, "Name of one of the scene's [[view]] tables; its [camera] where absent");
   render->add_option("--method", picture.method, "In place of the scene's")
-      ->check(CLI::IsMember({"exact", "volume", "path"}));
+      ->check(CLI::IsMember(method_names()));
   render->add_option("--spp", picture.spp, "Samples per pixel, in place of the scene's")->check(CLI::Range(1, 1 << 24));
   render->add_option("--seconds", picture.seconds, "Path tracer: go on until this much time is spent")
       ->check(CLI::PositiveNumber);

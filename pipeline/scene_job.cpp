@@ -52,8 +52,26 @@ PathTracerSettings path_tracer_settings(const PictureRequest& request) {
   settings.seed = request.seed;
   settings.local = request.local;
   settings.estimator = request.estimator;
+  if (request.method == RenderMethod::kPath6) settings.limits.max_scatterings = 6;
   if (request.bounces) settings.limits.max_scatterings = *request.bounces;
   return settings;
+}
+
+LocalShading shading_of(RenderMethod method) {
+  switch (method) {
+    case RenderMethod::kPrinted:
+      return LocalShading::kPrinted;
+    case RenderMethod::kPrt:
+      return LocalShading::kPrt;
+    case RenderMethod::kTsaiShih16:
+      return LocalShading::kTsaiShih16;
+    case RenderMethod::kTsaiShihFull:
+      return LocalShading::kTsaiShihFull;
+    case RenderMethod::kDualScattering:
+      return LocalShading::kDualScattering;
+    default:
+      return LocalShading::kShipped;
+  }
 }
 
 }  // namespace
@@ -109,7 +127,7 @@ Needs SceneJob::needs_for(RenderMethod method) const {
 std::vector<StageCost> SceneJob::precompute_costs(const PictureRequest& request) {
   packs_for(request.method);
   std::vector<StageCost> all;
-  for (auto& [file, stages] : fabrics_) {
+  for (auto& [file, stages] : request.method == RenderMethod::kPrinted ? printed_fabrics() : fabrics_) {
     for (StageCost& cost : stages->costs(needs_for(request.method))) all.push_back(std::move(cost));
   }
   return all;
@@ -118,8 +136,19 @@ std::vector<StageCost> SceneJob::precompute_costs(const PictureRequest& request)
 std::vector<Artifact> SceneJob::packs_for(RenderMethod method) {
   const Needs needs = needs_for(method);
   std::vector<Artifact> packs;
-  for (auto& [file, stages] : fabrics_) packs.push_back(stages->pack(needs));
+  for (auto& [file, stages] : method == RenderMethod::kPrinted ? printed_fabrics() : fabrics_) {
+    packs.push_back(stages->pack(needs));
+  }
   return packs;
+}
+
+SceneJob::Fabrics& SceneJob::printed_fabrics() {
+  if (printed_fabrics_.empty()) {
+    for (const auto& [file, stages] : fabrics_) {
+      printed_fabrics_[file] = std::make_unique<FabricStages>(file, *context_, variant_.fabric, BakeChoices::kPrinted);
+    }
+  }
+  return printed_fabrics_;
 }
 
 std::string SceneJob::picture_key(const PictureRequest& request) {
@@ -180,7 +209,7 @@ PictureResult SceneJob::render(const PictureRequest& request, const std::string&
 
   double environment_error = 0;
   FrameBuffers frame;
-  if (request.method == RenderMethod::kPath) {
+  if (traces_paths(request.method)) {
     const std::vector<BcsdfTable> materials = scene_materials(*loaded.scene);
     const PathTracer tracer(*loaded.scene, materials, config_.lights, config_.background,
                             path_tracer_settings(request));
@@ -191,6 +220,7 @@ PictureResult SceneJob::render(const PictureRequest& request, const std::string&
       if (!cloth.surface) packs.push_back(&loaded.packs.at(cloth.fabric));
     }
     const PrecomputedSettings settings{.seed = request.seed,
+                                       .shading = shading_of(request.method),
                                        .volume = request.method == RenderMethod::kVolume,
                                        .shadow_sigma_mm = config_.shadow_sigma_mm,
                                        .blend = variant_.blend};

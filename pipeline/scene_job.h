@@ -35,7 +35,7 @@ struct PictureRequest {
   RenderMethod method = RenderMethod::kExact;
   int spp = 1;
   std::uint64_t seed = 1;
-  // Path tracer only.
+  // Where paths are traced only; bounces for kPath only.
   std::optional<double> seconds;
   bool local = false;
   std::optional<int> bounces;
@@ -69,6 +69,8 @@ class SceneJob {
  private:
   struct Loaded;
   Needs needs_for(RenderMethod method) const;
+  using Fabrics = std::map<std::filesystem::path, std::unique_ptr<FabricStages>>;
+  Fabrics& printed_fabrics();
   std::vector<Artifact> packs_for(RenderMethod method);
   const Loaded& loaded_for(RenderMethod method);
 
@@ -76,7 +78,8 @@ class SceneJob {
   std::string scene_text_;  // canonical text of what all pictures of the scene depend on
   StageContext* context_;
   SceneVariant variant_;
-  std::map<std::filesystem::path, std::unique_ptr<FabricStages>> fabrics_;
+  Fabrics fabrics_;
+  Fabrics printed_fabrics_;  // the same, baked as printed; empty until a picture needs them
   std::map<RenderMethod, std::unique_ptr<Loaded>> loaded_;
 };
 

@@ -156,8 +156,18 @@ struct FabricStages::Stage {
   std::map<std::string, std::string> metadata;
 };
 
-FabricStages::FabricStages(const fs::path& fabric_file, StageContext& context, const FabricVariant& variant)
-    : document_(read_fabric_document(fabric_file, context.seed, variant)), context_(&context) {}
+FabricStages::FabricStages(const fs::path& fabric_file, StageContext& context, const FabricVariant& variant,
+                           BakeChoices choices)
+    : document_(read_fabric_document(fabric_file, context.seed, variant)), context_(&context) {
+  if (choices == BakeChoices::kShipped) return;
+  if (document_.config.light_from_both_sides) {
+    throw ConfigError(fabric_file.string() +
+                      ": the printed axes lie above the horizon, and this fabric takes light from both sides");
+  }
+  origin_choice_ = OriginChoice::kMidpoint;
+  document_.visibility.sgs = {FibonacciSet::kPrinted, 48, 128, SgWeights::kVoronoi};
+  document_.visibility_text += " printed";
+}
 
 FabricStages::~FabricStages() = default;
 
@@ -237,7 +247,7 @@ const TileScene& FabricStages::scene() {
 
 const SegmentOrigins& FabricStages::origins() {
   if (!origins_) {
-    origins_ = find_segment_origins(scene(), document_.config.light_from_both_sides, OriginChoice::kExposed,
+    origins_ = find_segment_origins(scene(), document_.config.light_from_both_sides, origin_choice_,
                                     document_.config.seed);
   }
   return *origins_;
@@ -332,9 +342,11 @@ void FabricStages::run_shard(const Stage& stage, Work&& work) {
 
 // Maps do not depend on [visibility], which says how they are compressed.
 FabricStages::Stage FabricStages::maps_stage() {
-  return make_stage(
-      "maps", 3, ".safetensors", "",
-      {{"geometry", geometry_key()}, {"light_from", light_from()}, {"seed", fmt::format("{}", document_.config.seed)}});
+  std::vector<std::pair<std::string, std::string>> upstream = {{"geometry", geometry_key()},
+                                                               {"light_from", light_from()},
+                                                               {"seed", fmt::format("{}", document_.config.seed)}};
+  append_origins(upstream);
+  return make_stage("maps", 3, ".safetensors", "", std::move(upstream));
 }
 
 /// Computes one chunk of maps.
@@ -402,6 +414,10 @@ const char* FabricStages::light_from() const {
   return document_.config.light_from_both_sides ? "both" : "face";
 }
 
+void FabricStages::append_origins(std::vector<std::pair<std::string, std::string>>& upstream) const {
+  if (origin_choice_ == OriginChoice::kMidpoint) upstream.emplace_back("origins", "midpoint");
+}
+
 TransferSettings FabricStages::transfer_settings(std::optional<int> order) const {
   TransferSettings settings = document_.transfer;
   if (order) settings.order = *order;
@@ -409,11 +425,12 @@ TransferSettings FabricStages::transfer_settings(std::optional<int> order) const
 }
 
 FabricStages::Stage FabricStages::transfer_stage(const TransferSettings& settings) {
-  return make_stage("transfer", 3, ".safetensors", document_.transfer_text,
-                    {{"fibers", synth().key},
-                     {"order", fmt::format("{}", settings.order)},
-                     {"light_from", light_from()},
-                     {"seed", fmt::format("{}", settings.seed)}});
+  std::vector<std::pair<std::string, std::string>> upstream = {{"fibers", synth().key},
+                                                               {"order", fmt::format("{}", settings.order)},
+                                                               {"light_from", light_from()},
+                                                               {"seed", fmt::format("{}", settings.seed)}};
+  append_origins(upstream);
+  return make_stage("transfer", 3, ".safetensors", document_.transfer_text, std::move(upstream));
 }
 
 /// What the transfer stage and its shards need besides the settings.

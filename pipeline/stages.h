@@ -50,6 +50,10 @@ struct Needs {
 
 inline constexpr Needs kEverything{.ssdf = true, .sgs = true, .transfer = true, .volume = true, .order = {}};
 
+/// kPrinted: segment origins on the fiber's axis, and sums of Gaussians by the paper's axes, Voronoi weights and sharpness
+/// 128, whatever [visibility] says of them (Khungurn 2017, section 4.1). Cells are the leaves of our tree in both.
+enum class BakeChoices : std::uint8_t { kShipped, kPrinted };
+
 /// Which of the chunks of a long stage this process does: chunk c where c % count == index.
 struct Shard {
   std::uint32_t index = 0;
@@ -124,7 +128,9 @@ inline constexpr int kMeanFreePathSamples = 20000;
 class FabricStages {
  public:
   /// `context` outlives the object. A relative path is taken from the working directory.
-  FabricStages(const std::filesystem::path& fabric_file, StageContext& context, const FabricVariant& variant = {});
+  /// Errors: ConfigError where the printed axes, which lie above the horizon, meet light from both sides.
+  FabricStages(const std::filesystem::path& fabric_file, StageContext& context,
+               BakeChoices choices = BakeChoices::kShipped);
   ~FabricStages();
 
   const FabricDocument& document() const { return document_; }
@@ -167,6 +173,8 @@ class FabricStages {
   const SegmentOrigins& origins();
   const std::string& geometry_key();
   const char* light_from() const;
+  /// What a key holds besides where the origins are not the default's.
+  void append_origins(std::vector<std::pair<std::string, std::string>>& upstream) const;
   Stage maps_stage();
   Artifact maps();
   void compute_maps(const Stage& stage, const std::filesystem::path& file, std::uint32_t first, std::uint32_t end);
@@ -181,6 +189,7 @@ class FabricStages {
 
   FabricDocument document_;
   StageContext* context_;
+  OriginChoice origin_choice_ = OriginChoice::kExposed;
   std::optional<Exemplar> exemplar_;
   std::unique_ptr<TileScene> scene_;
   std::optional<SegmentOrigins> origins_;

@@ -39,7 +39,8 @@ double cosine_of_share(double share, double sharpness) {
 
 }  // namespace
 
-MultipleScattering::LightShape::LightShape(std::optional<float> sharpness) : directional_(!sharpness) {
+MultipleScattering::LightShape::LightShape(std::optional<float> sharpness, FaceLight face_light)
+    : directional_(!sharpness), face_light_(face_light) {
   band_.fill(1);
   if (!sharpness) return;
   const std::vector<double> ratios = spherical_bessel_ratios(kMaxShOrder, *sharpness);
@@ -75,7 +76,7 @@ MultipleScattering::LightShape::LightShape(std::optional<float> sharpness) : dir
 }
 
 void MultipleScattering::LightShape::project(int order, bool both_sides, const Vec3& axis, float* coefficients) const {
-  if (both_sides) {
+  if (both_sides || face_light_ == FaceLight::kPrinted) {
     evaluate_sh(order, axis, coefficients);
     for (int l = 0; l <= order; ++l) {
       for (int m = -l; m <= l; ++m) coefficients[l * (l + 1) + m] *= band_[static_cast<std::size_t>(l)];
@@ -127,14 +128,18 @@ void MultipleScattering::incoming(std::uint32_t cell, const LightShape& light, c
 
 Rgb MultipleScattering::outgoing(const IncomingField& field, std::uint16_t material, const Vec3& tangent,
                                  const Vec3& wo) const {
-  const int order = transfer_->order;
+  return outgoing_from_field(transfer_->order, field, materials_[material], tangent, wo);
+}
+
+Rgb outgoing_from_field(int order, const IncomingField& field, const BcsdfTable& bcsdf, const Vec3& tangent,
+                        const Vec3& wo) {
   IncomingField turned;
   ShRotation(order, wo_space(tangent, wo).cast<double>()).rotate<3>(field.data(), turned.data());
   IncomingField response;
   const float theta_o = std::asin(std::clamp(wo.dot(tangent), -1.0F, 1.0F));
-  materials_[material].sh_coefficients(theta_o, order, response.data());
+  bcsdf.sh_coefficients(theta_o, order, response.data());
   Rgb sum = Rgb::Zero();
-  for (int j = 0; j < transfer_->coefficients(); ++j) {
+  for (int j = 0; j < sh_count(order); ++j) {
     for (int c = 0; c < 3; ++c) sum[c] += response[3 * j + c] * turned[3 * j + c];
   }
   return sum;

@@ -44,7 +44,12 @@ class MultipleScattering {
   /// directional.
   class LightShape {
    public:
-    explicit LightShape(std::optional<float> sharpness);
+    /// How light is projected where the fabric takes it from its face only.
+    enum class FaceLight : std::uint8_t {
+      kDual,     // onto the dual of the moments over the upper hemisphere
+      kPrinted,  // as from both sides
+    };
+    explicit LightShape(std::optional<float> sharpness, FaceLight face_light = FaceLight::kDual);
 
     /// c_light for a light about `axis` (unit, fabric space): [sh_count(order)].
     void project(int order, bool both_sides, const Vec3& axis, float* coefficients) const;
@@ -57,6 +62,7 @@ class MultipleScattering {
     void moments_above(int order, const Vec3& axis, float* moments) const;
 
     bool directional_;
+    FaceLight face_light_;
     std::array<float, kMaxShOrder + 1> band_;  // [l]
     std::vector<float> upper_;  // [inclination][j] of a light whose axis lies in the xz plane; m < 0 are 0
   };
@@ -71,6 +77,10 @@ class MultipleScattering {
   const Transfer* transfer_;
   std::span<const BcsdfTable> materials_;
 };
+
+/// Radiance towards wo from a fiber with this tangent in the field of harmonics up to `order`.
+Rgb outgoing_from_field(int order, const IncomingField& field, const BcsdfTable& bcsdf, const Vec3& tangent,
+                        const Vec3& wo);
 
 /// Axes of wo-space as rows: x = tangent, wo = (sin theta_o, cos theta_o, 0). Any y where wo is along the
 /// tangent.

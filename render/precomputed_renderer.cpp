@@ -10,6 +10,8 @@
 #include <utility>
 
 #include "formats/input_error.h"
+#include "render/rivals/prt_scattering.h"
+#include "render/rivals/tsai_shih_scattering.h"
 
 namespace heddle {
 namespace {
@@ -38,6 +40,23 @@ void require(bool present, const FabricPack& pack, const char* what) {
       fmt::format("{}: the pack holds no {}, which this picture needs", pack.folder.string(), what));
 }
 
+std::shared_ptr<const SingleScatteringModel> single_scattering_of(const FabricPack& pack, LocalShading shading,
+                                                                 const VisibilityBlend& blend) {
+  switch (shading) {
+    case LocalShading::kPrt:
+      return std::make_shared<const PrtScattering>(*pack.ssdf, pack.light_from_both_sides, pack.materials);
+    case LocalShading::kTsaiShih16:
+    case LocalShading::kTsaiShihFull:
+      return std::make_shared<const TsaiShihScattering>(
+          *pack.ssdf, pack.light_from_both_sides, pack.materials,
+          shading == LocalShading::kTsaiShih16 ? BcsdfFactors::kRecommendedTerms : BcsdfFactors::kAllTerms);
+    default:
+      return std::make_shared<const SingleScattering>(
+          pack.ssdf ? &*pack.ssdf : nullptr, pack.sgs ? &*pack.sgs : nullptr, pack.materials, blend,
+          shading == LocalShading::kPrinted ? SgMethod::kPrinted : SgMethod::kDefault);
+  }
+}
+
 std::optional<float> shape_of(const Light& light) {
   if (light.is_directional()) return {};
   return light.sharpness;
@@ -54,29 +73,46 @@ PrecomputedRenderer::PrecomputedRenderer(const ClothScene& scene, std::span<cons
       lights_(fitted_.lights),
       background_(background),
       settings_(settings) {
+  using FaceLight = MultipleScattering::LightShape::FaceLight;
+  const bool printed = settings.shading == LocalShading::kPrinted;
+  const bool dual = settings.shading == LocalShading::kDualScattering;
   bool any_sharp = false;
   bool any_soft = false;
   for (const Light& light : lights_) {
-    shapes_.emplace_back(shape_of(light));
+    shapes_.emplace_back(shape_of(light), printed ? FaceLight::kPrinted : FaceLight::kDual);
     any_sharp = any_sharp || light.is_directional() || settings.blend.uses_distance(light.sharpness);
     any_soft = any_soft || (!light.is_directional() && settings.blend.uses_lobes(light.sharpness));
   }
+  if (settings.shading == LocalShading::kPrt || settings.shading == LocalShading::kTsaiShih16 ||
+      settings.shading == LocalShading::kTsaiShihFull) {
+    any_sharp = true;  // they take their visibility from the signed distances
+    any_soft = false;
+  }
   std::map<const FabricPack*, std::shared_ptr<const IdBricks>> bricks;
+  std::map<const FabricPack*, Cloth> by_pack;
   for (std::uint32_t cloth = 0; cloth < packs.size(); ++cloth) {
     const FabricPack& pack = *packs[cloth];
-    require(pack.transfer.has_value(), pack, "transfer");
-    require(pack.ssdf.has_value() || !any_sharp, pack, "signed distances");
-    require(pack.sgs.has_value() || !any_soft, pack, "sums of Gaussians");
+    require(pack.transfer.has_value() || dual, pack, "transfer");
+    require(pack.ssdf.has_value() || !any_sharp || dual, pack, "signed distances");
+    require(pack.sgs.has_value() || !any_soft || dual, pack, "sums of Gaussians");
     require(pack.volume.has_value() || !settings.volume, pack, "volume");
     std::shared_ptr<const IdBricks>& own_bricks = bricks[&pack];
     if (settings.volume && !own_bricks) own_bricks = std::make_shared<const IdBricks>(*pack.volume);
     const Shell& shell = scene.shell(cloth);
-    cloths_.push_back(
-        {&pack, own_bricks,
-         SingleScattering(pack.ssdf ? &*pack.ssdf : nullptr, pack.sgs ? &*pack.sgs : nullptr, pack.materials,
-                          settings.blend),
-         MultipleScattering(*pack.transfer, pack.materials),
-         settings.shadow_sigma_mm.value_or(shell.z_max() - shell.z_min())});
+    const auto [known, is_new] = by_pack.try_emplace(&pack);
+    if (is_new) {
+      Cloth& first = known->second;
+      if (dual) {
+        first.dual = std::make_shared<const DualScattering>(scene.tile(cloth), pack.materials);
+      } else {
+        first.single = single_scattering_of(pack, settings.shading, settings.blend);
+        first.multiple.emplace(*pack.transfer, pack.materials);
+      }
+    }
+    cloths_.push_back(known->second);
+    cloths_.back().pack = &pack;
+    cloths_.back().bricks = own_bricks;
+    cloths_.back().shadow_sigma = settings.shadow_sigma_mm.value_or(shell.z_max() - shell.z_min());
   }
 }
 
@@ -117,6 +153,20 @@ Rgb PrecomputedRenderer::surface_light(const SurfaceHit& hit, const Vec3& wo, Ra
   return surface_direct_light(hit, wo, scene_lights_, LightEstimator::kCombined, random, [&](const Vec3& direction) {
     return scene_->globally_visible({hit.position, hit.normal}, direction);
   });
+}
+
+DualScattering::Parts PrecomputedRenderer::dual_scattered(const ShellHit& hit, const ShadingPoint& point,
+                                                          const Light& light, RandomStream& random) const {
+  const Cloth& cloth = cloths_[hit.cloth];
+  const Vec3 world = sample_light(light, random).direction;
+  const Vec3 fabric = scene_->fabric_direction(hit, world);
+  if (!cloth.pack->light_from_both_sides && !(fabric.z() > 0)) return {};
+  // The hit in the base tile.
+  const Exemplar& exemplar = cloth.pack->exemplar;
+  Vec3d position = hit.fabric;
+  position.x() -= std::floor(position.x() / exemplar.width_mm) * exemplar.width_mm;
+  position.y() -= std::floor(position.y() / exemplar.height_mm) * exemplar.height_mm;
+  return cloth.dual->directional(point, position.cast<float>(), {world, fabric});
 }
 
 void PrecomputedRenderer::shade(const Camera& camera, const PixelRect& block, int first, int last,
@@ -165,7 +215,7 @@ void PrecomputedRenderer::shade(const Camera& camera, const PixelRect& block, in
     const FabricPack& pack = *cloths_[hit->cloth].pack;
     const Vec3 wo = -ray.direction;
     points.push_back({hit->segment,
-                      pack.transfer->cell_of_segment[hit->segment],
+                      pack.transfer ? pack.transfer->cell_of_segment[hit->segment] : 0,
                       pack.exemplar.segment_material(hit->segment),
                       {scene_->world_tangent(*hit), pack.exemplar.segment_tangent(hit->segment)},
                       {wo, scene_->fabric_direction(*hit, wo)}});
@@ -196,7 +246,7 @@ void PrecomputedRenderer::shade(const Camera& camera, const PixelRect& block, in
     const ShellHit& hit = hits[k];
     const ShadingPoint& point = points[k];
     const Cloth& cloth = cloths_[hit.cloth];
-    const int values = 3 * cloth.pack->transfer->coefficients();
+    const int values = cloth.multiple ? 3 * cloth.pack->transfer->coefficients() : 0;
     Sample& sample = samples[sample_of[k]];
     RandomStream random(settings_.seed, RandomStage::kLightVisibility, address(sample_of[k] / per_pixel),
                         static_cast<std::uint64_t>(first + sample_of[k] % per_pixel));
@@ -206,10 +256,17 @@ void PrecomputedRenderer::shade(const Camera& camera, const PixelRect& block, in
     for (std::size_t l = 0; l < lights_.size(); ++l) {
       const Light& light = lights_[l];
       const GlobalVisibility visible = global_visibility(hit, light, random);
+      if (cloth.dual) {
+        if (!visible.at_point) continue;
+        const DualScattering::Parts parts = dual_scattered(hit, point, light, random);
+        sample.single += light.irradiance * parts.single;
+        sample.multiple += light.irradiance * parts.multiple;
+        continue;
+      }
       const DirectionPair axis = {light.axis, scene_->fabric_direction(hit, light.axis)};
       if (visible.at_point) {
-        sample.single += light.irradiance * (light.is_directional() ? cloth.single.directional(point, axis)
-                                                                    : cloth.single.spherical_gaussian(
+        sample.single += light.irradiance * (light.is_directional() ? cloth.single->directional(point, axis)
+                                                                    : cloth.single->spherical_gaussian(
                                                                           point, axis, light.sharpness));
       }
       if (!visible.nearby) continue;
@@ -219,12 +276,12 @@ void PrecomputedRenderer::shade(const Camera& camera, const PixelRect& block, in
         own.cloth = hit.cloth;
         own.cell = point.cell;
         own.axis = axis.fabric;
-        cloth.multiple.incoming(point.cell, shapes_[l], axis.fabric, own.field);
+        cloth.multiple->incoming(point.cell, shapes_[l], axis.fabric, own.field);
       }
       for (int j = 0; j < values; ++j) field[j] += light.irradiance[j % 3] * own.field[j];
     }
     if (any_nearby) {
-      sample.multiple = cloth.multiple.outgoing(field, point.material, point.tangent.fabric, point.wo.fabric);
+      sample.multiple = cloth.multiple->outgoing(field, point.material, point.tangent.fabric, point.wo.fabric);
     }
   }
 }

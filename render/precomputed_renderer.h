@@ -9,7 +9,7 @@
 //      by a 2D Gaussian, whose mean is the smoothed visibility of multiple scattering. For a spherical Gaussian the ray
 //      goes in a direction drawn from the light (the mean is a soft shadow); where the fabric takes light from its face
 //      only, from that part of the light that lies on the face's side, since the precomputed data hold no other light;
-//   3. shading, sorted by cell and tetrahedron: single_scattering.h, multiple_scattering.h. Incoming fields of all lights
+//   3. shading, sorted by cell and tetrahedron: single_scattering.h, multiple_scattering.h, or a rival of theirs. Incoming fields of all lights
 //      are summed before they are turned and scattered, and are kept while cell and light direction stay the same.
 // Surface cloths are lit directly, at once, with shadows of the same shells and meshes (surface_cloth.h).
 // What is not modelled: light between different parts of the cloth, and the shell's bend between two fibers of one cell.
@@ -33,12 +33,24 @@
 #include "render/path_tracer.h"
 #include "render/pixel_sums.h"
 #include "render/render_output.h"
+#include "render/rivals/dual_scattering.h"
 #include "render/single_scattering.h"
 
 namespace heddle {
 
+/// Who shades what an eye ray sees. All but dual scattering take multiple scattering from the pack's transfer.
+enum class LocalShading : std::uint8_t {
+  kShipped,         // single_scattering.h, multiple_scattering.h
+  kPrinted,         // the same with Gamma and the projection of light as Khungurn 2017 prints them
+  kPrt,             // rivals/prt_scattering.h
+  kTsaiShih16,      // rivals/tsai_shih_scattering.h, 16 terms
+  kTsaiShihFull,    // the same, all terms
+  kDualScattering,  // rivals/dual_scattering.h, single and multiple
+};
+
 struct PrecomputedSettings {
   std::uint64_t seed = 1;
+  LocalShading shading = LocalShading::kShipped;
   bool volume = false;  // eye rays through the packs' id volumes instead of against fibers
   // Deviation of the Gaussian; the thickness of the cloth where absent.
   std::optional<double> shadow_sigma_mm;
@@ -76,15 +88,20 @@ class PrecomputedRenderer {
   struct Cloth {
     const FabricPack* pack;
     std::shared_ptr<const IdBricks> bricks;
-    SingleScattering single;
-    MultipleScattering multiple;
-    double shadow_sigma;  // mm
+    std::shared_ptr<const SingleScatteringModel> single;
+    std::optional<MultipleScattering> multiple;
+    std::shared_ptr<const DualScattering> dual;  // then neither single nor multiple
+    double shadow_sigma;                         // mm
   };
   /// Is the light visible past all macroscopic things, at the point and at the point moved along the cloth?
   struct GlobalVisibility {
     bool at_point = false;
     bool nearby = false;
   };
+
+  /// A light's share of a sample by dual scattering; a Gaussian's in a direction drawn from it.
+  DualScattering::Parts dual_scattered(const ShellHit& hit, const ShadingPoint& point, const Light& light,
+                                       RandomStream& random) const;
 
   std::optional<ShellHit> eye_hit(const SceneRay& ray) const;
   Rgb surface_light(const SurfaceHit& hit, const Vec3& wo, RandomStream& random) const;

@@ -81,7 +81,7 @@ ViewConfig read_view(const TomlTable& table, const SceneConfig& scene, int defau
   ViewConfig view;
   view.camera = read_camera(table);
   view.spp = static_cast<int>(table.integer("spp", 1, 1 << 24, default_spp));
-  if (scene.method == RenderMethod::kPath && view.spp % 2 != 0) {
+  if (traces_paths(scene.method) && view.spp % 2 != 0) {
     table.fail("spp", "expected an even number: the path tracer keeps two half pictures");
   }
   if (const std::optional<TomlTable> reference = table.optional_table("reference")) {
@@ -180,22 +180,23 @@ ClothConfig read_cloth(const TomlTable& table) {
 }  // namespace
 
 std::optional<RenderMethod> render_method_of(std::string_view name) {
-  for (const RenderMethod method : {RenderMethod::kExact, RenderMethod::kVolume, RenderMethod::kPath}) {
-    if (name == render_method_name(method)) return method;
+  for (const NamedRenderMethod& named : kRenderMethods) {
+    if (name == named.name) return named.method;
   }
   return {};
 }
 
 const char* render_method_name(RenderMethod method) {
-  switch (method) {
-    case RenderMethod::kExact:
-      return "exact";
-    case RenderMethod::kVolume:
-      return "volume";
-    case RenderMethod::kPath:
-      return "path";
+  for (const NamedRenderMethod& named : kRenderMethods) {
+    if (method == named.method) return named.name.data();
   }
   return "";
+}
+
+std::vector<std::string_view> render_method_names() {
+  std::vector<std::string_view> names;
+  for (const NamedRenderMethod& named : kRenderMethods) names.push_back(named.name);
+  return names;
 }
 
 SceneConfig read_scene_config(const TomlTable& document) {
@@ -209,7 +210,7 @@ SceneConfig read_scene_config(const TomlTable& document) {
   for (const TomlTable& table : document.tables("mesh")) scene.meshes.push_back(read_mesh(table));
   int default_spp = 16;
   if (const std::optional<TomlTable> render = document.optional_table("render")) {
-    scene.method = *render_method_of(render->choice("method", {"exact", "volume", "path"}, "exact"));
+    scene.method = *render_method_of(render->choice("method", render_method_names(), "exact"));
     default_spp = static_cast<int>(render->integer("spp", 1, 1 << 24, default_spp));
     scene.seed = static_cast<std::uint64_t>(render->integer("seed", 0, INT64_MAX, 1));
     scene.shadow_sigma_mm = render->optional_number("shadow_sigma_mm", {0, 1e3});

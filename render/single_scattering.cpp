@@ -68,7 +68,7 @@ Rgb SingleScattering::soft(const ShadingPoint& point, const DirectionPair& axis,
   for (int q = 0; q < lobes; ++q) {
     if (!(carried[q] > weak)) continue;
     const Vec3 mean = (own * lobes_->axes[q] + sharpness * light) / product_sharpness[q];
-    sum += carried[q] * bcsdf.sg_scatter(lobe_to_fiber * mean, product_sharpness[q], wo);
+    sum += carried[q] * scattered(bcsdf, lobe_to_fiber * mean, product_sharpness[q], wo);
   }
   return sum / (sg_mass(own) * sg_mass(sharpness));
 }
@@ -80,7 +80,13 @@ Rgb SingleScattering::sharp(const ShadingPoint& point, const DirectionPair& axis
   if (!(visible > 0)) return Rgb::Zero();
   const Mat3 to_fiber = frame_about(point.tangent.world).transpose();
   return visible / sg_mass(sharpness) *
-         materials_[point.material].sg_scatter(to_fiber * axis.world, sharpness, to_fiber * point.wo.world);
+         scattered(materials_[point.material], to_fiber * axis.world, sharpness, to_fiber * point.wo.world);
+}
+
+Rgb SingleScattering::scattered(const BcsdfTable& bcsdf, const Vec3& axis, float sharpness, const Vec3& wo) const {
+  if (gamma_ == SgMethod::kDefault) return bcsdf.sg_scatter(axis, sharpness, wo);
+  return sg_scatter(bcsdf.fiber(), {axis.cast<double>().normalized(), sharpness}, wo.cast<double>(), gamma_)
+      .cast<float>();
 }
 
 }  // namespace heddle

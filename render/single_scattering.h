@@ -13,7 +13,7 @@
 // they are in the picture), signed distances are looked up in fabric space, where they were baked. The lobes of the soft
 // branch live in fabric space too, and a product of lobe and light only makes sense in one space, so all of that branch,
 // Gamma included, is evaluated in fabric space.
-// Gamma is what BcsdfTable::sg_scatter computes; its errors are stated there. Tested in
+// Gamma is what BcsdfTable::sg_scatter computes, or the printed form (sg_scatter.h); their errors are stated there. Tested in
 // tests/render/single_scattering_test.cpp.
 
 #include <compare>
@@ -22,6 +22,7 @@
 #include "fibers/baked/segment_visibility.h"
 #include "fibers/math/vector.h"
 #include "fibers/scattering/bcsdf_table.h"
+#include "fibers/scattering/sg_scatter.h"
 
 namespace heddle {
 
@@ -52,25 +53,36 @@ struct VisibilityBlend {
 inline constexpr VisibilityBlend kSignedDistanceOnly{-2, -1};
 inline constexpr VisibilityBlend kLobesOnly{1e30F, 2e30F};
 
-class SingleScattering {
+/// Radiance by single scattering from one light of irradiance 1: what SingleScattering and its rivals (render/rivals/)
+/// offer to the renderer.
+class SingleScatteringModel {
+ public:
+  virtual ~SingleScatteringModel() = default;
+  virtual Rgb directional(const ShadingPoint& point, const DirectionPair& light) const = 0;
+  /// sharpness 0: constant light from everywhere.
+  virtual Rgb spherical_gaussian(const ShadingPoint& point, const DirectionPair& axis, float sharpness) const = 0;
+};
+
+class SingleScattering final : public SingleScatteringModel {
  public:
   /// Either representation may be absent (nullptr) where no light needs it. What is passed must outlive this
-  /// object.
-  SingleScattering(const SsdfVisibility* ssdf, const SgVisibility* lobes,
-                   std::span<const BcsdfTable> materials, const VisibilityBlend& blend = {})
-      : ssdf_(ssdf), lobes_(lobes), materials_(materials), blend_(blend) {}
+  /// object. gamma: SgMethod::kDefault, or kPrinted for the paper's own.
+  SingleScattering(const SsdfVisibility* ssdf, const SgVisibility* lobes, std::span<const BcsdfTable> materials,
+                   const VisibilityBlend& blend = {}, SgMethod gamma = SgMethod::kDefault)
+      : ssdf_(ssdf), lobes_(lobes), materials_(materials), blend_(blend), gamma_(gamma) {}
 
-  Rgb directional(const ShadingPoint& point, const DirectionPair& light) const;
-  /// sharpness 0: constant light from everywhere.
-  Rgb spherical_gaussian(const ShadingPoint& point, const DirectionPair& axis, float sharpness) const;
+  Rgb directional(const ShadingPoint& point, const DirectionPair& light) const override;
+  Rgb spherical_gaussian(const ShadingPoint& point, const DirectionPair& axis, float sharpness) const override;
 
  private:
+  Rgb scattered(const BcsdfTable& bcsdf, const Vec3& axis, float sharpness, const Vec3& wo) const;
   Rgb soft(const ShadingPoint& point, const DirectionPair& axis, float sharpness) const;
   Rgb sharp(const ShadingPoint& point, const DirectionPair& axis, float sharpness) const;
   const SsdfVisibility* ssdf_;
   const SgVisibility* lobes_;
   std::span<const BcsdfTable> materials_;
   VisibilityBlend blend_;
+  SgMethod gamma_;
 };
 
 }  // namespace heddle

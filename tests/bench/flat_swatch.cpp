@@ -1,10 +1,11 @@
 // How far the precomputed methods are from path tracing on a flat, endless cloth: 41 views x 12 directional lights, as in
 // Figure 13 of Khungurn 2017. Not a test: it prints, and writes PREFIX.csv (every value) and PREFIX.svg (curves).
 //
-//   heddle_flat_swatch PACK [--paths N] [--floor-paths K] [--seed S] [--out PREFIX]
+//   heddle_flat_swatch PACK [--printed PACK] [--paths N] [--floor-paths K] [--sharpness L] [--seed S] [--out PREFIX]
 //
 // Views: theta_o = -80, -76, .. 80 degrees in the xz plane. Lights: theta = 10, 30, 50, 70 degrees at azimuths 0, 60, 135
-// degrees from +x, irradiance 1 across the light's axis. Values: radiance averaged over the tile, rgb.
+// degrees from +x, irradiance 1 across the light's axis; with --sharpness spherical Gaussians about the same axes, for which the
+// reference draws one direction per eye ray, and of which only what lies above the horizon shines. Values: radiance averaged over the tile, rgb.
 // One walk of the reference serves all lights: next-event estimation of each at every vertex.
 // The methods shade the same eye rays:
 //   exact     eye rays against the fibers, single scattering by SSDF sign, multiple scattering by the cells' transfer
@@ -14,7 +15,10 @@
 //   floor     exact, with the single scattering of the reference, and multiple scattering by the transfer to the hit point
 //             itself, to the same SH order: what the truncation alone costs. K paths from the hit point per eye ray, each
 //             4 pi * throughput * K(w0 . light) * sum over j of Y_j(w1) c_S[j], K the reproducing kernel
-//             sum of (2 l + 1) / 4 pi P_l (less that of the mirrored light where the transfer is continued oddly).
+//             sum of (2 l + 1) / 4 pi P_l (less that of the mirrored light where the transfer is continued oddly);
+//             directional lights only.
+//   path-6, prt, tsai-shih-16, tsai-shih-full, dual-scattering, and printed where its pack is named: as `heddle render` names
+//             them (docs/rivals.md). A pack for `printed` comes from a render with that method.
 //
 // Error: sqrt(mean of (F1 - R1)(F2 - R2)) / mean R, where 1 and 2 are two independent halves of all samples, so that
 // neither the reference's noise nor the methods' own counts. A method shares eye rays with the half of the reference it is
@@ -30,6 +34,7 @@
 #include <fstream>
 #include <functional>
 #include <iostream>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -42,6 +47,9 @@
 #include "fibers/tracing/tile_trace.h"
 #include "formats/input_error.h"
 #include "render/multiple_scattering.h"
+#include "render/rivals/dual_scattering.h"
+#include "render/rivals/prt_scattering.h"
+#include "render/rivals/tsai_shih_scattering.h"
 #include "render/single_scattering.h"
 
 namespace heddle {
@@ -70,9 +78,23 @@ double light_azimuth(int light) {
   return kLightAzimuth[static_cast<std::size_t>(light) % kLightAzimuth.size()];
 }
 
-enum Method { kReference, kExact, kVolume, kOrigin, kFloor, kMethods };
-constexpr std::array<const char*, kMethods> kMethodNames = {"reference", "exact", "volume", "origin",
-                                                            "floor"};
+enum Method {
+  kReference,
+  kExact,
+  kVolume,
+  kOrigin,
+  kFloor,
+  kPath6,
+  kPrinted,
+  kPrt,
+  kTsaiShih16,
+  kTsaiShihFull,
+  kDualScattering,
+  kMethods
+};
+constexpr std::array<const char*, kMethods> kMethodNames = {
+    "reference", "exact", "volume", "origin", "floor", "path-6", "printed", "prt", "tsai-shih-16", "tsai-shih-full",
+    "dual-scattering"};
 enum Part { kSingle, kMultiple, kTotal, kParts };
 constexpr std::array<const char*, kParts> kPartNames = {"single", "multiple", "total"};
 
@@ -96,6 +118,8 @@ double reproducing_kernel(int order, double x) {
 
 struct Options {
   std::string pack;
+  std::string printed;  // the pack of `printed`; that method is left out where empty
+  std::optional<float> sharpness;  // of the lights; directional where absent
   int paths = 4096;
   int floor_paths = 4;
   std::uint64_t seed = 1;
@@ -104,18 +128,37 @@ struct Options {
 
 class Swatch {
  public:
-  Swatch(const FabricPack& pack, const Options& options)
+  using LightShape = MultipleScattering::LightShape;
+
+  Swatch(const FabricPack& pack, const FabricPack* printed, const Options& options)
       : pack_(pack),
+        printed_(printed),
         options_(options),
         scene_(pack.exemplar),
         trace_(scene_),
         origins_(
             find_segment_origins(scene_, pack.light_from_both_sides, OriginChoice::kExposed, options.seed)),
         bricks_(*pack.volume),
-        single_(&*pack.ssdf, nullptr, pack.materials),
+        single_(&*pack.ssdf, pack.sgs ? &*pack.sgs : nullptr, pack.materials),
         multiple_(*pack.transfer, pack.materials),
+        shape_(options.sharpness),
+        printed_shape_(options.sharpness, LightShape::FaceLight::kPrinted),
+        prt_(*pack.ssdf, pack.light_from_both_sides, pack.materials),
+        tsai_shih_16_(*pack.ssdf, pack.light_from_both_sides, pack.materials, BcsdfFactors::kRecommendedTerms),
+        tsai_shih_full_(*pack.ssdf, pack.light_from_both_sides, pack.materials, BcsdfFactors::kAllTerms),
+        dual_(scene_, pack.materials),
         strata_(std::max(1, static_cast<int>(std::lround(std::sqrt(options.paths / 2.0))))) {
     for (int l = 0; l < kLights; ++l) lights_[l] = direction_of(light_theta(l), light_azimuth(l));
+    if (printed != nullptr) {
+      printed_single_.emplace(&*printed->ssdf, printed->sgs ? &*printed->sgs : nullptr, printed->materials,
+                              SgMethod::kPrinted);
+      printed_multiple_.emplace(*printed->transfer, printed->materials);
+    }
+  }
+
+  bool has(int method) const {
+    if (method == kFloor) return !options_.sharpness;
+    return method != kPrinted || printed_ != nullptr;
   }
 
   /// Mean values of one view over half of the eye rays.
@@ -134,12 +177,17 @@ class Swatch {
       const float y = (static_cast<float>(i / strata_) + random.uniform()) / static_cast<float>(strata_);
       const Vec3 origin(x * exemplar.width_mm, y * exemplar.height_mm, exemplar.z_max);
       if (const auto vertex = trace_.first(origin, -wo)) {
-        add_reference(*vertex, wo, random, scale, sum);
+        std::array<Vec3, kLights> towards = lights_;
+        if (options_.sharpness) {
+          for (Vec3& light : towards) light = sample_spherical_gaussian(light, *options_.sharpness, random);
+        }
+        add_reference(*vertex, wo, towards, random, scale, sum);
         add_precomputed(vertex->segment, vertex->tangent, wo, scale, sum[kExact]);
-        add_origin_single(*vertex, wo, scale, sum[kOrigin][kSingle]);
-        for (int k = 0; k < options_.floor_paths; ++k) {
+        add_origin_single(*vertex, wo, towards, scale, sum[kOrigin][kSingle]);
+        for (int k = 0; k < options_.floor_paths && has(kFloor); ++k) {
           add_floor_multiple(*vertex, wo, random, scale / options_.floor_paths, sum[kFloor][kMultiple]);
         }
+        add_rivals(*vertex, wo, towards, scale, sum);
       }
       if (const auto hit = bricks_.first_hit({origin, -wo})) {
         add_precomputed(hit->segment, exemplar.segment_tangent(hit->segment), wo, scale, sum[kVolume]);
@@ -147,12 +195,14 @@ class Swatch {
     }
     sum[kOrigin][kMultiple] = sum[kExact][kMultiple];
     sum[kFloor][kSingle] = sum[kReference][kSingle];
+    sum[kPath6][kSingle] = sum[kReference][kSingle];
+    for (const Method method : {kPrt, kTsaiShih16, kTsaiShihFull}) sum[method][kMultiple] = sum[kExact][kMultiple];
     return sum;
   }
 
  private:
-  void add_reference(const TileTrace::Vertex& hit, const Vec3& wo, RandomStream& random, double scale,
-                     MethodValues& sum) const {
+  void add_reference(const TileTrace::Vertex& hit, const Vec3& wo, const std::array<Vec3, kLights>& lights,
+                     RandomStream& random, double scale, MethodValues& sum) const {
     auto& parts = sum[kReference];
     walk_path(trace_, std::span<const BcsdfTable>(pack_.materials), hit, wo, Rgb(1, 1, 1), random,
               WalkLimits{},
@@ -160,13 +210,47 @@ class Swatch {
                   int n) {
                 const Vec3 local_out = frame.transpose() * out;
                 for (int l = 0; l < kLights; ++l) {
-                  if (!trace_.escapes(vertex, lights_[l])) continue;
+                  if (!shines(lights[l]) || !trace_.escapes(vertex, lights[l])) continue;
                   const Rgb value =
-                      throughput * scattered(vertex.material, frame.transpose() * lights_[l], local_out);
+                      throughput * scattered(vertex.material, frame.transpose() * lights[l], local_out);
                   parts[n == 1 ? kSingle : kMultiple][l] += scale * value.cast<double>();
+                  if (n > 1 && n <= 6) sum[kPath6][kMultiple][l] += scale * value.cast<double>();
                 }
                 return true;
               });
+  }
+
+  bool shines(const Vec3& light) const { return pack_.light_from_both_sides || light.z() > 0; }
+
+  Rgb single_of(const SingleScatteringModel& model, const ShadingPoint& point, int l) const {
+    const DirectionPair axis = {lights_[l], lights_[l]};
+    return options_.sharpness ? model.spherical_gaussian(point, axis, *options_.sharpness)
+                              : model.directional(point, axis);
+  }
+
+  void add_rivals(const TileTrace::Vertex& hit, const Vec3& wo, const std::array<Vec3, kLights>& towards, double scale,
+                  MethodValues& sum) const {
+    ShadingPoint point = {hit.segment, pack_.transfer->cell_of_segment[hit.segment], hit.material,
+                          {hit.tangent, hit.tangent}, {wo, wo}};
+    for (int l = 0; l < kLights; ++l) {
+      sum[kPrt][kSingle][l] += scale * single_of(prt_, point, l).cast<double>();
+      sum[kTsaiShih16][kSingle][l] += scale * single_of(tsai_shih_16_, point, l).cast<double>();
+      sum[kTsaiShihFull][kSingle][l] += scale * single_of(tsai_shih_full_, point, l).cast<double>();
+      if (shines(towards[l])) {
+        const DualScattering::Parts parts = dual_.directional(point, hit.position, {towards[l], towards[l]});
+        sum[kDualScattering][kSingle][l] += scale * parts.single.cast<double>();
+        sum[kDualScattering][kMultiple][l] += scale * parts.multiple.cast<double>();
+      }
+    }
+    if (printed_ == nullptr) return;
+    point.cell = printed_->transfer->cell_of_segment[hit.segment];
+    for (int l = 0; l < kLights; ++l) {
+      sum[kPrinted][kSingle][l] += scale * single_of(*printed_single_, point, l).cast<double>();
+      IncomingField field;
+      printed_multiple_->incoming(point.cell, printed_shape_, lights_[l], field);
+      sum[kPrinted][kMultiple][l] +=
+          scale * printed_multiple_->outgoing(field, point.material, hit.tangent, wo).cast<double>();
+    }
   }
 
   Rgb scattered(std::uint16_t material, const Vec3& wi, const Vec3& wo) const {
@@ -180,23 +264,22 @@ class Swatch {
                                 pack_.exemplar.segment_material(segment),
                                 {tangent, tangent},
                                 {wo, wo}};
-    const MultipleScattering::LightShape shape{std::nullopt};
     for (int l = 0; l < kLights; ++l) {
-      parts[kSingle][l] += scale * single_.directional(point, {lights_[l], lights_[l]}).cast<double>();
+      parts[kSingle][l] += scale * single_of(single_, point, l).cast<double>();
       IncomingField field;
-      multiple_.incoming(point.cell, shape, lights_[l], field);
+      multiple_.incoming(point.cell, shape_, lights_[l], field);
       parts[kMultiple][l] += scale * multiple_.outgoing(field, point.material, tangent, wo).cast<double>();
     }
   }
 
-  void add_origin_single(const TileTrace::Vertex& hit, const Vec3& wo, double scale, Values& sum) const {
+  void add_origin_single(const TileTrace::Vertex& hit, const Vec3& wo, const std::array<Vec3, kLights>& lights,
+                         double scale, Values& sum) const {
     const TileTrace::Vertex origin = trace_.at(origins_.position[hit.segment], hit.segment);
     const Mat3 frame = frame_about(hit.tangent);
     for (int l = 0; l < kLights; ++l) {
-      if (!trace_.escapes(origin, lights_[l])) continue;
+      if (!shines(lights[l]) || !trace_.escapes(origin, lights[l])) continue;
       sum[l] +=
-          scale *
-          scattered(hit.material, frame.transpose() * lights_[l], frame.transpose() * wo).cast<double>();
+          scale * scattered(hit.material, frame.transpose() * lights[l], frame.transpose() * wo).cast<double>();
     }
   }
 
@@ -233,6 +316,7 @@ class Swatch {
   }
 
   const FabricPack& pack_;
+  const FabricPack* printed_;
   const Options& options_;
   TileScene scene_;
   TileTrace trace_;
@@ -240,6 +324,14 @@ class Swatch {
   IdBricks bricks_;
   SingleScattering single_;
   MultipleScattering multiple_;
+  LightShape shape_;
+  LightShape printed_shape_;
+  PrtScattering prt_;
+  TsaiShihScattering tsai_shih_16_;
+  TsaiShihScattering tsai_shih_full_;
+  DualScattering dual_;
+  std::optional<SingleScattering> printed_single_;
+  std::optional<MultipleScattering> printed_multiple_;
   std::array<Vec3, kLights> lights_;
   int strata_;  // per side of the tile, of each half
 };
@@ -286,7 +378,8 @@ Comparison compare(const std::array<Half, 2>& halves, int method, int part, int 
           std::sqrt(std::max(0.0, squared))};
 }
 
-void print_report(const FabricPack& pack, const Options& options, const std::array<Half, 2>& halves) {
+void print_report(const FabricPack& pack, const Swatch& swatch, const Options& options,
+                  const std::array<Half, 2>& halves) {
   const double noise = std::sqrt(mean_over(-1, [&](int v, int l, int c) {
     const double d =
         value(halves[0][v], kReference, kTotal, l, c) - value(halves[1][v], kReference, kTotal, l, c);
@@ -298,13 +391,16 @@ void print_report(const FabricPack& pack, const Options& options, const std::arr
              kViews, kLights, options.paths);
   fmt::print("mean reference radiance {:.5f}; its standard error, rms over values: {:.2f} %\n\n", total,
              100 * noise / total);
-  fmt::print("{:<10}{:<10}{:>12}{:>14}{:>16}{:>26}\n", "method", "part", "mean ratio", "RMSE of part",
+  fmt::print("{:<16}{:<10}{:>12}{:>14}{:>16}{:>26}\n", "method", "part", "mean ratio", "RMSE of part",
              "RMSE of total", "RMSE of part, r / g / b");
   for (int m = kExact; m < kMethods; ++m) {
+    if (!swatch.has(m)) continue;
     for (int p = 0; p < kParts; ++p) {
-      if ((m == kOrigin && p == kMultiple) || (m == kFloor && p == kSingle)) continue;  // another method's
+      const bool multiple_of_exact = m == kOrigin || m == kPrt || m == kTsaiShih16 || m == kTsaiShihFull;
+      const bool single_of_reference = m == kFloor || m == kPath6;
+      if ((multiple_of_exact && p == kMultiple) || (single_of_reference && p == kSingle)) continue;
       const Comparison all = compare(halves, m, p, -1);
-      fmt::print("{:<10}{:<10}{:>12.4f}{:>12.2f} %{:>14.2f} %    ", kMethodNames[m], kPartNames[p],
+      fmt::print("{:<16}{:<10}{:>12.4f}{:>12.2f} %{:>14.2f} %    ", kMethodNames[m], kPartNames[p],
                  all.mean / all.reference, 100 * all.rmse / all.reference, 100 * all.rmse / total);
       for (int c = 0; c < 3; ++c) {
         const Comparison one = compare(halves, m, p, c);
@@ -315,12 +411,13 @@ void print_report(const FabricPack& pack, const Options& options, const std::arr
   }
 }
 
-void write_csv(const std::string& path, const std::array<Half, 2>& halves) {
+void write_csv(const std::string& path, const Swatch& swatch, const std::array<Half, 2>& halves) {
   std::ofstream file(path);
   file << "view_deg,light_theta_deg,light_azimuth_deg,method,part,half,r,g,b\n";
   for (int v = 0; v < kViews; ++v) {
     for (int l = 0; l < kLights; ++l) {
       for (int m = 0; m < kMethods; ++m) {
+        if (!swatch.has(m)) continue;
         for (int p = 0; p < kTotal; ++p) {
           for (int h = 0; h < 2; ++h) {
             file << fmt::format("{},{},{},{},{},{},{:.7g},{:.7g},{:.7g}\n", view_degrees(v), light_theta(l),
@@ -345,8 +442,12 @@ void write_svg(const std::string& path, const std::string& title, const std::arr
     Method method;
     const char* colour;
   };
-  constexpr std::array<Curve, 4> kCurves = {
-      {{kReference, "#000000"}, {kExact, "#d62728"}, {kVolume, "#1f77b4"}, {kFloor, "#2ca02c"}}};
+  constexpr std::array<Curve, 6> kCurves = {{{kReference, "#000000"},
+                                             {kExact, "#d62728"},
+                                             {kVolume, "#1f77b4"},
+                                             {kPrt, "#2ca02c"},
+                                             {kTsaiShih16, "#9467bd"},
+                                             {kDualScattering, "#ff7f0e"}}};
   const auto grey = [&](int m, int p, int v, int l) {
     double sum = 0;
     for (const Half& half : halves) {
@@ -372,7 +473,7 @@ void write_svg(const std::string& path, const std::string& title, const std::arr
   for (const Curve& curve : kCurves) {
     file << fmt::format("<text x=\"{}\" y=\"32\" fill=\"{}\">{}</text>\n", x, curve.colour,
                         kMethodNames[curve.method]);
-    x += 80;
+    x += 110;
   }
   for (int l = 0; l < kLights; ++l) {
     const double left = kMargin + l % kColumns * kPanelWidth;
@@ -390,7 +491,6 @@ void write_svg(const std::string& path, const std::string& title, const std::arr
         left + width, bottom + 12);
     for (const Curve& curve : kCurves) {
       for (const Part part : {kTotal, kSingle}) {
-        if (part == kSingle && curve.method == kFloor) continue;
         file << fmt::format("<polyline fill=\"none\" stroke=\"{}\" stroke-width=\"1.3\"{} points=\"",
                             curve.colour, part == kSingle ? " stroke-dasharray=\"4 3\"" : "");
         for (int v = 0; v < kViews; ++v) {
@@ -410,13 +510,20 @@ void run(const Options& options) {
   if (!pack.ssdf || !pack.transfer || !pack.volume) {
     throw FileError(options.pack + ": the pack needs an SSDF, a transfer and a volume");
   }
-  const Swatch swatch(pack, options);
+  std::optional<FabricPack> printed;
+  if (!options.printed.empty()) {
+    printed = load_pack(options.printed);
+    if (!printed->ssdf || !printed->transfer) throw FileError(options.printed + ": needs an SSDF and a transfer");
+  }
+  const bool soft = options.sharpness && *options.sharpness < VisibilityBlend{}.to;
+  if (soft && (!pack.sgs || (printed && !printed->sgs))) throw FileError("a pack lacks sums of Gaussians");
+  const Swatch swatch(pack, printed ? &*printed : nullptr, options);
   std::array<Half, 2> halves = {Half(kViews), Half(kViews)};
   tbb::parallel_for(0, 2 * kViews, [&](int i) {
     halves[static_cast<std::size_t>(i % 2)][i / 2] = swatch.measure(i / 2, i % 2);
   });
-  print_report(pack, options, halves);
-  write_csv(options.prefix + ".csv", halves);
+  print_report(pack, swatch, options, halves);
+  write_csv(options.prefix + ".csv", swatch, halves);
   write_svg(options.prefix + ".svg", pack.name, halves);
 }
 
@@ -427,6 +534,9 @@ int main(int argc, char** argv) {
   heddle::Options options;
   CLI::App app("Radiance of a flat swatch: precomputed methods against path tracing.");
   app.add_option("pack", options.pack, "fabric pack with SSDF, transfer and volume")->required();
+  app.add_option("--printed", options.printed, "pack of the same fabric, baked for the method `printed`");
+  app.add_option("--sharpness", options.sharpness, "spherical Gaussians in place of directional lights")
+      ->check(CLI::NonNegativeNumber);
   app.add_option("--paths", options.paths, "eye rays per view, both halves together")
       ->check(CLI::Range(2, 100'000'000));
   app.add_option("--floor-paths", options.floor_paths, "paths for the floor, per eye ray")

@@ -1,0 +1,50 @@
+#ifndef HEDDLE_RENDER_RIVALS_TSAI_SHIH_SCATTERING_H_
+#define HEDDLE_RENDER_RIVALS_TSAI_SHIH_SCATTERING_H_
+// Single scattering by the scheme of Tsai and Shih 2006 as Khungurn 2017, section 6.2, compares it: the BCSDF factored by its
+// singular value decomposition, visibility in spherical Gaussians, more of them than ours.
+//
+// Per segment V(w) = sum over q of share_q A_q G(w; xi_q, s) / M(s): 512 axes on the upper hemisphere (1024 on the sphere), s = 512,
+// share_q the open part of the axis' Voronoi cell and A_q the cell's solid angle (Khungurn 2017, section 4.1), from the signs of
+// the stored signed distances; one byte per Gaussian. The transfer function of factor r is V g_r cos(theta_i); with the light it
+// integrates to
+//   spherical Gaussian: lobe by lobe, the product of lobe and light being a Gaussian again (BcsdfFactors::response);
+//   directional:        V(w) g_r(w) cos(theta_i).
+// Tsai and Shih fit Gaussians to V g_r itself; a lobe as wide as those would smear a specular g_r, so g_r stays exact here, which
+// favours the rival. The sum over r is folded into the cut matrix: time does not depend on R.
+// Everything in fabric space. Tested in tests/render/rivals/tsai_shih_scattering_test.cpp.
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "fibers/baked/segment_visibility.h"
+#include "fibers/scattering/bcsdf_table.h"
+#include "render/rivals/bcsdf_factors.h"
+#include "render/single_scattering.h"
+
+namespace heddle {
+
+class TsaiShihScattering final : public SingleScatteringModel {
+ public:
+  static constexpr int kLobesPerHemisphere = 512;
+  static constexpr float kSharpness = 512;
+
+  /// All arguments are needed here only. terms: see BcsdfFactors.
+  TsaiShihScattering(const SsdfVisibility& ssdf, bool both_sides, std::span<const BcsdfTable> materials, int terms);
+
+  Rgb directional(const ShadingPoint& point, const DirectionPair& light) const override;
+  Rgb spherical_gaussian(const ShadingPoint& point, const DirectionPair& axis, float sharpness) const override;
+
+  /// V of a segment in a direction.
+  float visibility(std::uint32_t segment, const Vec3& direction) const;
+
+ private:
+  std::vector<BcsdfFactors> factors_;  // [material]
+  std::vector<Vec3> axes_;             // [lobe]
+  std::vector<float> cell_;            // [lobe] A_q / M(s)
+  std::vector<std::uint8_t> share_;    // [segment][lobe] 255 where the whole cell is open
+};
+
+}  // namespace heddle
+
+#endif  // HEDDLE_RENDER_RIVALS_TSAI_SHIH_SCATTERING_H_
