@@ -28,7 +28,7 @@ std::vector<double> mode_ratios(double k, int highest) {
 
 }  // namespace
 
-BcsdfFactors::BcsdfFactors(const FiberScattering& fiber, int terms) {
+BcsdfFactors::BcsdfFactors(const FiberScattering& fiber, int terms, Matrix matrix) {
   constexpr double kFinest = kPi / 512;
   constexpr double kCoarsest = kPi / 96;
   const double narrowest = fiber.isotropic_white ? kPi : std::min(fiber.beta_r, fiber.beta_tt);
@@ -66,7 +66,7 @@ BcsdfFactors::BcsdfFactors(const FiberScattering& fiber, int terms) {
   for (int c = 0; c < 3; ++c) {
     const auto at = static_cast<std::size_t>(c);
     if (terms != kAllTerms) {
-      cut(both[at], tt[at], scales, terms, c);
+      cut(both[at], tt[at], scales, terms, matrix, c);
       continue;
     }
     terms_[at] = thetas_ * static_cast<int>(2 * scales.size() - 1);
@@ -82,13 +82,18 @@ BcsdfFactors::BcsdfFactors(const FiberScattering& fiber, int terms) {
   }
 }
 
-void BcsdfFactors::cut(const Block& both, const Block& tt, const std::vector<double>& mode_scales, int terms, int c) {
-  Eigen::ArrayXf root(thetas_);
+void BcsdfFactors::cut(const Block& both, const Block& tt, const std::vector<double>& mode_scales, int terms, Matrix matrix,
+                       int c) {
+  // What the blocks, which hold S cos(theta_i), are multiplied by on either side.
+  Eigen::ArrayXf left(thetas_);
+  Eigen::ArrayXf right(thetas_);
   for (int i = 0; i < thetas_; ++i) {
-    root[i] = static_cast<float>(std::sqrt(std::cos(kPi * ((i + 0.5) / thetas_ - 0.5))));
+    const double cosine = std::cos(kPi * ((i + 0.5) / thetas_ - 0.5));
+    left[i] = static_cast<float>(matrix == Matrix::kWeighted ? std::sqrt(cosine) : 1 / cosine);
+    right[i] = static_cast<float>(matrix == Matrix::kWeighted ? std::sqrt(cosine) : 1);
   }
   const auto decompose = [&](const Block& block) {
-    return Eigen::BDCSVD<Eigen::MatrixXf>(root.matrix().asDiagonal() * block * root.matrix().asDiagonal(),
+    return Eigen::BDCSVD<Eigen::MatrixXf>(left.matrix().asDiagonal() * block * right.matrix().asDiagonal(),
                                           Eigen::ComputeThinU | Eigen::ComputeThinV);
   };
   const auto svd_both = decompose(both);
@@ -125,12 +130,11 @@ void BcsdfFactors::cut(const Block& both, const Block& tt, const std::vector<dou
   terms_[at] = spent;
   energy_[at] = total > 0 ? held / total : 1;
 
-  const Eigen::ArrayXf unroot = root.inverse();
   const auto rebuilt = [&](const Eigen::BDCSVD<Eigen::MatrixXf>& svd, int rank) -> Block {
-    return unroot.matrix().asDiagonal() *
+    return left.inverse().matrix().asDiagonal() *
            (svd.matrixU().leftCols(rank) * svd.singularValues().head(rank).asDiagonal() *
             svd.matrixV().leftCols(rank).transpose()) *
-           unroot.matrix().asDiagonal();
+           right.inverse().matrix().asDiagonal();
   };
   for (std::size_t m = 0; m < kept.size(); ++m) {
     if (kept[m] == 0) continue;

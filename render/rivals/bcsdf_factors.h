@@ -7,8 +7,10 @@
 // spaced in azimuth Fourier modes cos(m (phi_o - phi_i)) split the matrix into blocks over (theta_i, theta_o) (m = 0 once, m > 0
 // twice, as cos cos and sin sin): the singular values of the blocks are the matrix's. Mode 0 holds R and TT; every other
 // mode is the block of TT times a number, so there are two decompositions per colour, whatever the number of azimuths.
-// Blocks are weighed by the square roots of the solid angles, which makes the cut the best one in the mean over the spheres. Where one
-// of a pair's two terms would be cut off, both are.
+// What is cut depends on what is decomposed. kWeighted: S cos(theta_i) times the square roots of the two solid angles, for which the
+// cut is the best in the mean over the spheres. kPlain: the values of S alone. S grows as 1 / Gn near grazing, a thousandfold for
+// beta = 1 degree, and the first terms of the plain matrix hold little else: all other directions go black.
+// Where one of a pair's two terms would be cut off, both are.
 // The lattice in theta resolves the narrowest lobe (deviations from 0.7 degrees, half a deviation per step); between lattice
 // points the matrix is interpolated linearly, which widens a lobe: the peak of the narrowest is 2 % low.
 // With all terms the matrix is not decomposed. A second or two per fiber at R = 16. Tested in tests/render/rivals/bcsdf_factors_test.cpp.
@@ -27,7 +29,9 @@ class BcsdfFactors {
   static constexpr int kRecommendedTerms = 16;
   static constexpr int kAllTerms = -1;
 
-  BcsdfFactors(const FiberScattering& fiber, int terms);
+  enum class Matrix { kWeighted, kPlain };
+
+  BcsdfFactors(const FiberScattering& fiber, int terms, Matrix matrix = Matrix::kWeighted);
 
   /// S(wi, wo) cos(theta_i), fiber frame. Can be negative when terms are cut.
   Rgb value(const Vec3& wi, const Vec3& wo) const;
@@ -53,7 +57,7 @@ class BcsdfFactors {
     std::vector<Mode> modes;
     std::vector<Block> blocks;
   };
-  void cut(const Block& both, const Block& tt, const std::vector<double>& mode_scales, int terms, int c);
+  void cut(const Block& both, const Block& tt, const std::vector<double>& mode_scales, int terms, Matrix matrix, int c);
 
   int thetas_;
   int highest_mode_ = 0;

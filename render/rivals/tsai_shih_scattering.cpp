@@ -19,8 +19,9 @@ constexpr float kLeftOut = 1e-3F;
 }  // namespace
 
 TsaiShihScattering::TsaiShihScattering(const SsdfVisibility& ssdf, bool both_sides,
-                                       std::span<const BcsdfTable> materials, int terms) {
-  for (const BcsdfTable& material : materials) factors_.emplace_back(material.fiber(), terms);
+                                       std::span<const BcsdfTable> materials, int terms,
+                                       BcsdfFactors::Matrix matrix) {
+  for (const BcsdfTable& material : materials) factors_.emplace_back(material.fiber(), terms, matrix);
   const int lobes = both_sides ? 2 * kLobesPerHemisphere : kLobesPerHemisphere;
   for (const Vec3d& axis :
        fibonacci_axes(both_sides ? FibonacciSet::kSphere : FibonacciSet::kHemisphere, lobes)) {

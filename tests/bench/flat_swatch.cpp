@@ -18,7 +18,7 @@
 //             sum of (2 l + 1) / 4 pi P_l (less that of the mirrored light where the transfer is continued oddly);
 //             directional lights only.
 //   path-6, prt, tsai-shih-16, tsai-shih-full, dual-scattering, and printed where its pack is named: as `heddle render` names
-//             them (docs/rivals.md). A pack for `printed` comes from a render with that method.
+//             them (docs/rivals.md); tsai-shih-plain is tsai-shih-16 by the plain matrix (render/rivals/bcsdf_factors.h). A pack for `printed` comes from a render with that method.
 //
 // Error: sqrt(mean of (F1 - R1)(F2 - R2)) / mean R, where 1 and 2 are two independent halves of all samples, so that
 // neither the reference's noise nor the methods' own counts. A method shares eye rays with the half of the reference it is
@@ -88,13 +88,14 @@ enum Method {
   kPrinted,
   kPrt,
   kTsaiShih16,
+  kTsaiShihPlain,
   kTsaiShihFull,
   kDualScattering,
   kMethods
 };
 constexpr std::array<const char*, kMethods> kMethodNames = {
-    "reference", "exact", "volume", "origin", "floor", "path-6", "printed", "prt", "tsai-shih-16", "tsai-shih-full",
-    "dual-scattering"};
+    "reference", "exact", "volume", "origin", "floor", "path-6", "printed", "prt", "tsai-shih-16",
+    "tsai-shih-plain", "tsai-shih-full", "dual-scattering"};
 enum Part { kSingle, kMultiple, kTotal, kParts };
 constexpr std::array<const char*, kParts> kPartNames = {"single", "multiple", "total"};
 
@@ -145,6 +146,8 @@ class Swatch {
         printed_shape_(options.sharpness, LightShape::FaceLight::kPrinted),
         prt_(*pack.ssdf, pack.light_from_both_sides, pack.materials),
         tsai_shih_16_(*pack.ssdf, pack.light_from_both_sides, pack.materials, BcsdfFactors::kRecommendedTerms),
+        tsai_shih_plain_(*pack.ssdf, pack.light_from_both_sides, pack.materials, BcsdfFactors::kRecommendedTerms,
+                         BcsdfFactors::Matrix::kPlain),
         tsai_shih_full_(*pack.ssdf, pack.light_from_both_sides, pack.materials, BcsdfFactors::kAllTerms),
         dual_(scene_, pack.materials),
         strata_(std::max(1, static_cast<int>(std::lround(std::sqrt(options.paths / 2.0))))) {
@@ -196,7 +199,7 @@ class Swatch {
     sum[kOrigin][kMultiple] = sum[kExact][kMultiple];
     sum[kFloor][kSingle] = sum[kReference][kSingle];
     sum[kPath6][kSingle] = sum[kReference][kSingle];
-    for (const Method method : {kPrt, kTsaiShih16, kTsaiShihFull}) sum[method][kMultiple] = sum[kExact][kMultiple];
+    for (const Method method : {kPrt, kTsaiShih16, kTsaiShihPlain, kTsaiShihFull}) sum[method][kMultiple] = sum[kExact][kMultiple];
     return sum;
   }
 
@@ -235,6 +238,7 @@ class Swatch {
     for (int l = 0; l < kLights; ++l) {
       sum[kPrt][kSingle][l] += scale * single_of(prt_, point, l).cast<double>();
       sum[kTsaiShih16][kSingle][l] += scale * single_of(tsai_shih_16_, point, l).cast<double>();
+      sum[kTsaiShihPlain][kSingle][l] += scale * single_of(tsai_shih_plain_, point, l).cast<double>();
       sum[kTsaiShihFull][kSingle][l] += scale * single_of(tsai_shih_full_, point, l).cast<double>();
       if (shines(towards[l])) {
         const DualScattering::Parts parts = dual_.directional(point, hit.position, {towards[l], towards[l]});
@@ -328,6 +332,7 @@ class Swatch {
   LightShape printed_shape_;
   PrtScattering prt_;
   TsaiShihScattering tsai_shih_16_;
+  TsaiShihScattering tsai_shih_plain_;
   TsaiShihScattering tsai_shih_full_;
   DualScattering dual_;
   std::optional<SingleScattering> printed_single_;
@@ -396,7 +401,7 @@ void print_report(const FabricPack& pack, const Swatch& swatch, const Options& o
   for (int m = kExact; m < kMethods; ++m) {
     if (!swatch.has(m)) continue;
     for (int p = 0; p < kParts; ++p) {
-      const bool multiple_of_exact = m == kOrigin || m == kPrt || m == kTsaiShih16 || m == kTsaiShihFull;
+      const bool multiple_of_exact = m == kOrigin || m == kPrt || (m >= kTsaiShih16 && m <= kTsaiShihFull);
       const bool single_of_reference = m == kFloor || m == kPath6;
       if ((multiple_of_exact && p == kMultiple) || (single_of_reference && p == kSingle)) continue;
       const Comparison all = compare(halves, m, p, -1);

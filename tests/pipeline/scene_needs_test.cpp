@@ -36,6 +36,17 @@ TEST(SceneNeeds, FollowTheMethod) {
   EXPECT_TRUE(exact.transfer);
   EXPECT_FALSE(exact.volume);
   EXPECT_TRUE(needs_of(RenderMethod::kVolume, lights).volume);
+  for (const RenderMethod none : {RenderMethod::kPath6, RenderMethod::kDualScattering}) {
+    const Needs needs = needs_of(none, lights);
+    EXPECT_FALSE(needs.ssdf || needs.sgs || needs.transfer || needs.volume);
+  }
+  const std::vector<Light> soft = {gaussian(10)};
+  for (const RenderMethod rival : {RenderMethod::kPrt, RenderMethod::kTsaiShih16, RenderMethod::kTsaiShihFull}) {
+    const Needs needs = needs_of(rival, soft);
+    EXPECT_TRUE(needs.ssdf && needs.transfer);
+    EXPECT_FALSE(needs.sgs);
+  }
+  EXPECT_TRUE(needs_of(RenderMethod::kPrinted, soft).sgs);
 }
 
 }  // namespace

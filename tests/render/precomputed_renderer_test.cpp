@@ -141,6 +141,46 @@ TEST(PrecomputedRendererLaw, OpenFurnaceOfWhiteFibersIsOne) {
   }
 }
 
+TEST(PrecomputedRendererLaw, RivalsShowTheOpenFurnaceAsOne) {
+  // Nothing hides anything in this pack's signed distances, so single scattering of white fibers in light 1 is 1.
+  const auto world = make_world(open_pack(white_isotropic(), true), {gaussian({0, 0, 1}, 0, 4 * kPif)});
+  for (const LocalShading shading : {LocalShading::kPrt, LocalShading::kTsaiShih16, LocalShading::kTsaiShihFull}) {
+    PrecomputedSettings settings;
+    settings.shading = shading;
+    const FrameBuffers frame =
+        shade_picture(world->renderer(settings), camera_above(1, 12, 8), {0, 0, 12, 8}, 1, kNoProgress);
+    for (std::size_t k = 0; k < frame.pixel_count(); ++k) {
+      if (frame.alpha[k] < 1) continue;
+      EXPECT_LT((frame.single[k] - 1).abs().maxCoeff(), 0.01);  // 1 %: weak lobes left out
+    }
+  }
+}
+
+TEST(PrecomputedRenderer, DualScatteringNeedsNothingBaked) {
+  // A fiber that the light reaches shows its BCSDF as `single`; all show something in `multiple`.
+  const FiberScattering cotton = test_cotton();
+  FabricPack bare = open_pack(cotton);
+  bare.ssdf.reset();
+  bare.sgs.reset();
+  bare.transfer.reset();
+  const auto world = make_world(std::move(bare), {directional({0.4F, 0.1F, 1}, 2)});
+  const auto shipped = make_world(open_pack(cotton), {directional({0.4F, 0.1F, 1}, 2)});
+  const Camera camera = camera_above(0.4, 16, 16);
+  PrecomputedSettings settings;
+  settings.shading = LocalShading::kDualScattering;
+  const FrameBuffers dual = shade_picture(world->renderer(settings), camera, {0, 0, 16, 16}, 1, kNoProgress);
+  const FrameBuffers open = shade_picture(shipped->renderer(), camera, {0, 0, 16, 16}, 1, kNoProgress);
+  int lit = 0;
+  for (std::size_t k = 0; k < dual.pixel_count(); ++k) {
+    if (dual.alpha[k] < 1) continue;
+    EXPECT_GT(dual.multiple[k].maxCoeff(), 0);
+    if (!(dual.single[k].maxCoeff() > 0)) continue;
+    EXPECT_LT((dual.single[k] - open.single[k]).abs().maxCoeff(), 1e-4F * open.single[k].maxCoeff());
+    ++lit;
+  }
+  EXPECT_GT(lit, 50);
+}
+
 TEST(PrecomputedRenderer, SingleScatteringIsTheBcsdfAtTheFiberSeen) {
   const FiberScattering cotton = test_cotton();
   const Vec3 towards = Vec3(0.4F, 0.1F, 1).normalized();
