@@ -331,6 +331,24 @@ TEST(SurfacesEndToEnd, SurfacesAloneNeedNoStagesAndAnEditedOneMakesANewPicture) 
   EXPECT_EQ(shop.report({"info", "alone.toml"}).at("fabrics").at(0), "own.toml");
 }
 
+TEST(RivalsEndToEnd, EveryMethodRendersTheScene) {
+  const Workshop shop;
+  for (const char* method : {"path-6", "printed", "prt", "tsai-shih-16", "tsai-shih-full", "dual-scattering"}) {
+    const std::string file = std::string(method) + ".exr";
+    const ProgramResult result =
+        shop.run({"render", "scene.toml", "-o", file, "--method", method, "--crop", "8,8,14,14", "--spp", "2"});
+    EXPECT_EQ(result.status, 0) << method << ": " << result.error;
+  }
+  // Six scattering events are what the path tracer's own limit says.
+  ASSERT_EQ(shop.run({"render", "scene.toml", "-o", "limited.exr", "--method", "path", "--bounces", "6", "--crop",
+                      "8,8,14,14", "--spp", "2"})
+                .status,
+            0);
+  EXPECT_EQ(shop.run({"compare", "limited.exr", "path-6.exr", "--max-rmse", "0"}).status, 0);
+  EXPECT_EQ(shop.run({"compare", "prt.exr", "tsai-shih-full.exr", "--max-rmse", "0"}).status, 1);
+  EXPECT_EQ(shop.run({"render", "scene.toml", "-o", "x.exr", "--method", "path-6", "--bounces", "3"}).status, 2);
+}
+
 struct BadInput {
   std::string name;
   Arguments arguments;

@@ -230,6 +230,23 @@ TEST(MultipleScatteringLaw, ACosineResponseHoldsDownToTheHorizon) {
   }
 }
 
+TEST(MultipleScattering, PrintedProjectionTakesNoNoticeOfTheHorizon) {
+  using LightShape = MultipleScattering::LightShape;
+  const Vec3 axis = Vec3(0.5F, -0.3F, 0.4F).normalized();
+  for (const std::optional<float> sharpness : {std::optional<float>(), std::optional<float>(30.0F)}) {
+    const LightShape printed(sharpness, LightShape::FaceLight::kPrinted);
+    const LightShape shipped(sharpness);
+    std::array<float, sh_count(5)> face;
+    std::array<float, sh_count(5)> both;
+    std::array<float, sh_count(5)> dual;
+    printed.project(5, false, axis, face.data());
+    shipped.project(5, true, axis, both.data());
+    shipped.project(5, false, axis, dual.data());
+    EXPECT_EQ(face, both);
+    EXPECT_NE(face, dual);
+  }
+}
+
 TEST(MultipleScattering, DirectionalLightFromBelowGivesNothingWhereLightComesFromTheFace) {
   const std::vector<BcsdfTable> materials;
   const Vec3 below = Vec3(0.2F, 0.1F, -0.3F).normalized();

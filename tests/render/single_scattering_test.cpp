@@ -210,6 +210,24 @@ TEST(SingleScatteringAgreement, SharpLightOverAnEdgeIsCloseToQuadrature) {
   }
 }
 
+TEST(SingleScattering, GammaIsThePrintedOneWhereAsked) {
+  const FiberScattering fiber = broad_fiber();
+  const SsdfVisibility ssdf = make_ssdf([](const Vec3d&) { return kPi; });
+  const std::vector<BcsdfTable> materials = {BcsdfTable(fiber)};
+  const SingleScattering printed(&ssdf, nullptr, materials, SgMethod::kPrinted);
+  RandomStream random(9, RandomStage::kTest, 0, 0);
+  for (int k = 0; k < 20; ++k) {
+    const ShadingPoint point = random_point(random);
+    const Vec3 axis = sample_sphere(random);
+    const Mat3 to_fiber = frame_about(point.tangent.world).transpose();
+    const Rgbd expected = sg_scatter(fiber, {(to_fiber * axis).cast<double>(), 300}, (to_fiber * point.wo.world).cast<double>(),
+                                     SgMethod::kPrinted) /
+                          sg_mass(300.0);
+    const Rgb value = printed.spherical_gaussian(point, {axis, axis}, 300);
+    EXPECT_LT((value.cast<double>() - expected).abs().maxCoeff(), 1e-4 * expected.maxCoeff() + 1e-6);
+  }
+}
+
 TEST(SingleScattering, BlendsLinearlyBetweenTheTwoRepresentations) {
   const std::vector<BcsdfTable> materials = {BcsdfTable(broad_fiber())};
   const SsdfVisibility open = make_ssdf([](const Vec3d&) { return kPi; });
