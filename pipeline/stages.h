@@ -129,7 +129,7 @@ class FabricStages {
  public:
   /// `context` outlives the object. A relative path is taken from the working directory.
   /// Errors: ConfigError where the printed axes, which lie above the horizon, meet light from both sides.
-  FabricStages(const std::filesystem::path& fabric_file, StageContext& context,
+  FabricStages(const std::filesystem::path& fabric_file, StageContext& context, const FabricVariant& variant = {},
                BakeChoices choices = BakeChoices::kShipped);
   ~FabricStages();
 

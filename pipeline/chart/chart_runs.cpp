@@ -111,6 +111,14 @@ std::vector<ChartRun> chart_runs(const SceneConfig& scene, const PictureRequest&
                     of_fabric({.voxel_rate = factor}),
                     volume});
   }
+  // The rivals (docs/rivals.md). Paths come in two halves, so their samples are even.
+  for (const RenderMethod method :
+       {RenderMethod::kPrinted, RenderMethod::kPrt, RenderMethod::kTsaiShih16, RenderMethod::kTsaiShihFull,
+        RenderMethod::kDualScattering, RenderMethod::kPath6}) {
+    for (const int n : quick ? List{} : List{4, 16, 64}) {
+      runs.push_back({render_method_name(method), spp_label(n), {{"spp", n}}, {}, with(base, method, n)});
+    }
+  }
   return runs;
 }
 

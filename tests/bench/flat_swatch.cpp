@@ -14,8 +14,8 @@
 //             encodes
 //   floor     exact, with the single scattering of the reference, and multiple scattering by the transfer to the hit point
 //             itself, to the same SH order: what the truncation alone costs. K paths from the hit point per eye ray, each
-//             4 pi * throughput * K(w0 . light) * sum over j of Y_j(w1) c_S[j], K the reproducing kernel
-//             sum of (2 l + 1) / 4 pi P_l (less that of the mirrored light where the transfer is continued oddly);
+//             4 pi * throughput * K(w0 . light) * sum over j of Y_j(w1) c_S[j], K(w0) = sum of
+//             Y_j(w0) c_light[j] with the light projected as by the renderer (MultipleScattering::LightShape);
 //             directional lights only.
 //   path-6, prt, tsai-shih-16, tsai-shih-full, dual-scattering, and printed where its pack is named: as `heddle render` names
 //             them (docs/rivals.md); tsai-shih-plain is tsai-shih-16 by the plain matrix (render/rivals/bcsdf_factors.h). A pack for `printed` comes from a render with that method.
@@ -103,20 +103,6 @@ using Values = std::array<Rgbd, kLights>;                          // [light]
 using MethodValues = std::array<std::array<Values, 2>, kMethods>;  // [method][single, multiple][light]
 using Half = std::vector<MethodValues>;                            // [view]
 
-/// Sum of (2 l + 1) / 4 pi P_l(x) for l <= order: the projection of a delta onto the harmonics.
-double reproducing_kernel(int order, double x) {
-  double previous = 0;
-  double current = 1;
-  double sum = 0;
-  for (int l = 0; l <= order; ++l) {
-    sum += (2 * l + 1) / (4 * kPi) * current;
-    const double next = ((2 * l + 1) * x * current - l * previous) / (l + 1);
-    previous = current;
-    current = next;
-  }
-  return sum;
-}
-
 struct Options {
   std::string pack;
   std::string printed;  // the pack of `printed`; that method is left out where empty
@@ -151,10 +137,14 @@ class Swatch {
         tsai_shih_full_(*pack.ssdf, pack.light_from_both_sides, pack.materials, BcsdfFactors::kAllTerms),
         dual_(scene_, pack.materials),
         strata_(std::max(1, static_cast<int>(std::lround(std::sqrt(options.paths / 2.0))))) {
-    for (int l = 0; l < kLights; ++l) lights_[l] = direction_of(light_theta(l), light_azimuth(l));
+    for (int l = 0; l < kLights; ++l) {
+      lights_[l] = direction_of(light_theta(l), light_azimuth(l));
+      MultipleScattering::LightShape(std::nullopt)
+          .project(pack.transfer->order, pack.transfer->both_sides, lights_[l], projected_[l].data());
+    }
     if (printed != nullptr) {
       printed_single_.emplace(&*printed->ssdf, printed->sgs ? &*printed->sgs : nullptr, printed->materials,
-                              SgMethod::kPrinted);
+                              VisibilityBlend{}, SgMethod::kPrinted);
       printed_multiple_.emplace(*printed->transfer, printed->materials);
     }
   }
@@ -308,13 +298,11 @@ class Swatch {
       for (int c = 0; c < 3; ++c) seen[c] += static_cast<double>(harmonics[j]) * response[3 * j + c];
     }
     const Rgbd carried = 4 * kPi * scale * escape->throughput.cast<double>() * seen;
+    std::array<float, sh_count(kMaxShOrder)> light_harmonics;
+    evaluate_sh(order, escape->direction, light_harmonics.data());
     for (int l = 0; l < kLights; ++l) {
-      double kernel = reproducing_kernel(order, escape->direction.dot(lights_[l]));
-      if (!pack_.light_from_both_sides) {
-        // The odd continuation of render/multiple_scattering.h.
-        const Vec3 mirrored(lights_[l].x(), lights_[l].y(), -lights_[l].z());
-        kernel -= reproducing_kernel(order, escape->direction.dot(mirrored));
-      }
+      double kernel = 0;
+      for (int j = 0; j < sh_count(order); ++j) kernel += static_cast<double>(light_harmonics[j]) * projected_[l][j];
       sum[l] += kernel * carried;
     }
   }
@@ -338,6 +326,7 @@ class Swatch {
   std::optional<SingleScattering> printed_single_;
   std::optional<MultipleScattering> printed_multiple_;
   std::array<Vec3, kLights> lights_;
+  std::array<std::array<float, sh_count(kMaxShOrder)>, kLights> projected_;  // [light][j] c_light
   int strata_;  // per side of the tile, of each half
 };
 

@@ -214,7 +214,7 @@ TEST(SingleScattering, GammaIsThePrintedOneWhereAsked) {
   const FiberScattering fiber = broad_fiber();
   const SsdfVisibility ssdf = make_ssdf([](const Vec3d&) { return kPi; });
   const std::vector<BcsdfTable> materials = {BcsdfTable(fiber)};
-  const SingleScattering printed(&ssdf, nullptr, materials, SgMethod::kPrinted);
+  const SingleScattering printed(&ssdf, nullptr, materials, VisibilityBlend{}, SgMethod::kPrinted);
   RandomStream random(9, RandomStage::kTest, 0, 0);
   for (int k = 0; k < 20; ++k) {
     const ShadingPoint point = random_point(random);
