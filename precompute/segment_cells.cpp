@@ -57,18 +57,19 @@ SegmentCells make_segment_cells(const Exemplar& exemplar, const SegmentOrigins& 
   std::vector<std::uint32_t> order(segments);
   std::iota(order.begin(), order.end(), 0U);
 
+  const auto weight_of = [&](std::uint32_t s) { return static_cast<double>(origins.openness[s]) + kLeastWeight; };
   const auto make_node = [&](std::uint32_t first, std::uint32_t last) {
     Node node{first, last, 0, Feature::Zero(), Feature::Zero()};
     double total = 0;
     for (std::uint32_t k = first; k < last; ++k) {
-      const double weight = static_cast<double>(origins.openness[order[k]]) + kLeastWeight;
+      const double weight = weight_of(order[k]);
       total += weight;
       node.mean += weight * features[order[k]];
     }
     node.mean /= total;
     Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
     for (std::uint32_t k = first; k < last; ++k) {
-      const double weight = static_cast<double>(origins.openness[order[k]]) + kLeastWeight;
+      const double weight = weight_of(order[k]);
       const Feature d = features[order[k]] - node.mean;
       covariance += weight * d * d.transpose();
     }

@@ -8,8 +8,6 @@
 namespace heddle {
 namespace {
 
-constexpr double kCosineShare = 0.5;  // of the draws of sample()
-
 // 0, 1/16 .. 15/16 in a random order, as evenly distributed deviates of mean 0 and standard deviation 1.
 std::array<double, WovenCotton::kVariants> shuffled_deviates(RandomStream& random) {
   constexpr int n = WovenCotton::kVariants;
@@ -145,8 +143,7 @@ std::optional<SurfaceSample> WovenCotton::sample(const SurfacePoint& point, cons
   const double a = random.uniform_double();
   const double b = random.uniform_double();
   if (choice < kCosineShare) {
-    const double azimuth = 2.0 * kPi * b;
-    wi = Vec3d(std::sqrt(a) * std::cos(azimuth), std::sqrt(a) * std::sin(azimuth), std::sqrt(1.0 - a));
+    wi = cosine_direction(a, b);
   } else {
     choice = (choice - kCosineShare) / (1.0 - kCosineShare);
     std::size_t kind = 0;
@@ -170,13 +167,9 @@ std::optional<SurfaceSample> WovenCotton::sample(const SurfacePoint& point, cons
 WovenCottonParameters read_woven_cotton(const TomlTable& document) {
   const auto read_yarn = [&](const char* section) {
     const TomlTable table = document.table(section);
-    const auto color = [&](const char* key, double max) {
-      const std::array<double, 3> rgb = table.number3(key, {.min = 0, .max = max});
-      return Rgbd(rgb[0], rgb[1], rgb[2]);
-    };
     CottonYarn yarn;
-    yarn.diffuse = color("diffuse", 1);
-    yarn.specular = color("specular", 100);
+    yarn.diffuse = read_yarn_color(table, "diffuse", 1);
+    yarn.specular = read_yarn_color(table, "specular", 100);
     yarn.semimajor = table.number("semimajor", {.min = 0, .max = 1000, .exclusive_min = true});
     yarn.eccentricity = table.number("eccentricity", {.min = 0, .max = 0.9999999});
     yarn.angle = radians(table.number("angle_deg", {.min = -360, .max = 360}));

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <sstream>
 #include <stdexcept>
@@ -203,6 +204,11 @@ WovenPattern read_woven_pattern(const TomlTable& section) {
   } catch (const std::invalid_argument& error) {
     section.fail(key, error.what());
   }
+}
+
+Rgbd read_yarn_color(const TomlTable& yarn, const char* key, double max) {
+  const std::array<double, 3> rgb = yarn.number3(key, {.min = 0, .max = max});
+  return {rgb[0], rgb[1], rgb[2]};
 }
 
 }  // namespace heddle

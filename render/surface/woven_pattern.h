@@ -91,6 +91,9 @@ class WovenPattern {
 /// The section [weave] of a woven surface: `notation` and `face` as in fabrics, or `matrix`, and the widths. Errors: ConfigError.
 WovenPattern read_woven_pattern(const TomlTable& section);
 
+/// A colour of a yarn: three numbers from 0 to `max`.
+Rgbd read_yarn_color(const TomlTable& yarn, const char* key, double max);
+
 }  // namespace heddle
 
 #endif  // HEDDLE_RENDER_SURFACE_WOVEN_PATTERN_H_

@@ -110,4 +110,9 @@ Vec2d half_vector(const Vec3d& wi, const Vec3d& wo) {
   return length > kShortestSum ? Vec2d(sum.head<2>() / length) : Vec2d::Zero();
 }
 
+Vec3d cosine_direction(double a, double b) {
+  const double azimuth = 2.0 * kPi * b;
+  return {std::sqrt(a) * std::cos(azimuth), std::sqrt(a) * std::sin(azimuth), std::sqrt(1.0 - a)};
+}
+
 }  // namespace heddle

@@ -51,6 +51,12 @@ double highlight_share(const WovenSegment& segment, const Vec2d& half);
 /// reflect nothing and are not sampled by half vectors, so that nothing overflows.
 inline constexpr double kShortestSum = 1e-30;
 
+/// Of the draws of the woven models' sample(), the share that follows the cosine; the rest draw half vectors.
+inline constexpr double kCosineShare = 0.5;
+
+/// Direction of the upper side with density cos / pi from two deviates in [0, 1).
+Vec3d cosine_direction(double a, double b);
+
 /// F(theta_d) G(wi, wo) / (n . wo): what the highlight reflects, (n . wi) included. F is fresnel_dielectric with the angle
 /// between wi and the half vector, G the shadowing of Torrance and Sparrow. 0 unless wi.z > 0 and wo.z > 0.
 double highlight_reflectance(const Vec3d& wi, const Vec3d& wo, double ior);

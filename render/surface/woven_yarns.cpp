@@ -11,8 +11,6 @@
 namespace heddle {
 namespace {
 
-constexpr double kCosineShare = 0.5;  // of the draws of sample()
-
 double smooth_step(double x) {
   const double t = std::clamp(x, 0.0, 1.0);
   return t * t * (3.0 - 2.0 * t);
@@ -346,8 +344,7 @@ std::optional<SurfaceSample> WovenYarns::sample(const SurfacePoint& point, const
   const double a = random.uniform_double();
   const double b = random.uniform_double();
   if (choice < kCosineShare) {
-    const double azimuth = 2.0 * kPi * b;
-    wi = Vec3d(std::sqrt(a) * std::cos(azimuth), std::sqrt(a) * std::sin(azimuth), std::sqrt(1.0 - a));
+    wi = cosine_direction(a, b);
   } else {
     const YarnSystem system =
         choice < kCosineShare + 0.5 * (1.0 - kCosineShare) ? YarnSystem::kWarp : YarnSystem::kWeft;
@@ -367,13 +364,9 @@ std::optional<SurfaceSample> WovenYarns::sample(const SurfacePoint& point, const
 WovenYarnsParameters read_woven_yarns(const TomlTable& document) {
   const auto read_yarn = [&](const char* section) {
     const TomlTable table = document.table(section);
-    const auto color = [&](const char* key, double max) {
-      const std::array<double, 3> rgb = table.number3(key, {.min = 0, .max = max});
-      return Rgbd(rgb[0], rgb[1], rgb[2]);
-    };
     YarnMaterial yarn;
-    yarn.diffuse = color("diffuse", 1);
-    yarn.specular = color("specular", 100);
+    yarn.diffuse = read_yarn_color(table, "diffuse", 1);
+    yarn.specular = read_yarn_color(table, "specular", 100);
     yarn.uniform = table.number("alpha", {.min = 0, .max = 100});
     yarn.forward = table.number("beta", {.min = 0, .max = 1000});
     yarn.twist = radians(table.number("psi_deg", {.min = -89, .max = 89}));

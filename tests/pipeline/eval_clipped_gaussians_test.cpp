@@ -2,24 +2,16 @@
 
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <sstream>
 #include <string>
 
 #include "fibers/math/circular_gaussian.h"
 #include "fibers/math/vector.h"
-#include "pipeline/eval/eval.h"
+#include "tests/pipeline/eval_answer.h"
 
 namespace heddle {
 namespace {
 
 using Json = nlohmann::json;
-
-Json answer(const Json& request) {
-  std::istringstream in(request.dump() + "\n");
-  std::ostringstream out;
-  run_eval(in, out);
-  return Json::parse(out.str());
-}
 
 Json request_of(const char* method) {
   return {{"quantity", "clipped_gaussians"},
