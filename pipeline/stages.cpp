@@ -38,6 +38,10 @@ void write_transfer_chunk(const fs::path& path, const TransferChunk& chunk, int 
   writer.add<float>("matrices", {cells, bands * bands, bands * bands, 3}, chunk.matrices);
   writer.add<float>("standard_error", {cells, bands, 3}, chunk.standard_error);
   writer.add<std::uint32_t>("paths", {cells}, chunk.paths);
+  if (chunk.cones) {
+    writer.add<float>("cone_harmonics", {cells, bands * bands, bands * bands, 3}, chunk.cones->harmonics);
+    writer.add<float>("cone_moments", {cells, ConeTransfer::kWidths, bands * bands, ConeTransfer::kAzimuths, 3}, chunk.cones->moments);
+  }
   writer.write(path);
 }
 
@@ -49,6 +53,11 @@ TransferChunk read_transfer_chunk(const fs::path& path, std::uint32_t first_cell
   chunk.matrices = file.get<float>("matrices", {cells, bands * bands, bands * bands, 3});
   chunk.standard_error = file.get<float>("standard_error", {cells, bands, 3});
   chunk.paths = file.get<std::uint32_t>("paths", {cells});
+  if (file.entries().contains("cone_moments")) {
+    chunk.cones = ConeTransfer{
+        file.get<float>("cone_harmonics", {cells, bands * bands, bands * bands, 3}),
+        file.get<float>("cone_moments", {cells, ConeTransfer::kWidths, bands * bands, ConeTransfer::kAzimuths, 3})};
+  }
   return chunk;
 }
 
@@ -430,7 +439,7 @@ FabricStages::Stage FabricStages::transfer_stage(const TransferSettings& setting
                                                                {"light_from", light_from()},
                                                                {"seed", fmt::format("{}", settings.seed)}};
   append_origins(upstream);
-  return make_stage("transfer", 3, ".safetensors", document_.transfer_text, std::move(upstream));
+  return make_stage("transfer", 4, ".safetensors", document_.transfer_text, std::move(upstream));
 }
 
 /// What the transfer stage and its shards need besides the settings.

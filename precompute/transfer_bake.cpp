@@ -6,6 +6,7 @@
 #include <cassert>
 #include <cmath>
 
+#include "fibers/cloth/bundle_tangents.h"
 #include "fibers/math/spherical_harmonics.h"
 #include "fibers/tracing/path_walk.h"
 #include "fibers/tracing/tile_trace.h"
@@ -34,8 +35,21 @@ TransferSettings read_transfer_settings(const TomlTable& section) {
   settings.min_paths = static_cast<int>(section.integer("min_paths", 1, 100'000'000, 4096));
   settings.max_paths = static_cast<int>(section.integer("max_paths", 1, 100'000'000, 32768));
   if (settings.max_paths < settings.min_paths) section.fail("max_paths", "expected at least min_paths");
+  const std::string cones = section.choice("cones", {"auto", "on", "off"}, "auto");
+  settings.cones = cones == "auto" ? TransferSettings::Cones::kAuto
+                   : cones == "on" ? TransferSettings::Cones::kOn
+                                   : TransferSettings::Cones::kOff;
   settings.target_error = section.number("target_error", {.min = 1e-4, .max = 1}, 0.02);
   return settings;
+}
+
+bool keeps_light_on_cones(const Exemplar& exemplar, std::span<const Vec3> bundle_tangent) {
+  constexpr double kNarrowLobe = 3 * kPi / 180;
+  constexpr double kParallel = 4 * kPi / 180;
+  const bool narrow = std::any_of(exemplar.scattering.begin(), exemplar.scattering.end(), [](const FiberScattering& fiber) {
+    return !fiber.isotropic_white && std::min(fiber.beta_r, fiber.beta_tt) < kNarrowLobe;
+  });
+  return narrow && bundle_spread(exemplar, bundle_tangent) < kParallel;
 }
 
 TransferBaker::TransferBaker(const TileScene& scene, std::span<const BcsdfTable> materials,
@@ -46,6 +60,12 @@ TransferBaker::TransferBaker(const TileScene& scene, std::span<const BcsdfTable>
       settings_(settings),
       segment_cells_(&cells),
       cells_(cells.count) {
+  if (settings.cones != TransferSettings::Cones::kOff) {
+    bundle_tangent_ = bundle_tangents(scene.exemplar());
+    if (settings.cones == TransferSettings::Cones::kAuto && !keeps_light_on_cones(scene.exemplar(), bundle_tangent_)) {
+      bundle_tangent_.clear();
+    }
+  }
   for (std::uint32_t s = 0; s < scene.exemplar().segment_count(); ++s) {
     CellSegments& cell = cells_[cells.cell_of_segment[s]];
     const double before = cell.segment.empty() ? 0.0 : cell.cumulative_openness.back();
@@ -54,7 +74,7 @@ TransferBaker::TransferBaker(const TileScene& scene, std::span<const BcsdfTable>
   }
 }
 
-void TransferBaker::bake_cell(std::uint32_t cell, float* matrix, float* standard_error, std::uint32_t* paths) const {
+void TransferBaker::bake_cell(std::uint32_t cell, const CellResult& result) const {
   const auto& [segments, cumulative_openness] = cells_[cell];
   const int n = (settings_.order + 1) * (settings_.order + 1);
   const TileTrace trace(*scene_);
@@ -62,13 +82,22 @@ void TransferBaker::bake_cell(std::uint32_t cell, float* matrix, float* standard
 
   Eigen::ArrayXXd sum = Eigen::ArrayXXd::Zero(n, 3 * n);
   Eigen::ArrayXXd sum_of_squares = Eigen::ArrayXXd::Zero(n, 3 * n);
+  // Paths that stay on a cone fill the rows from the first on, all others from the last on.
   RowMajorMatrix light(kBatch, n);         // Y_j0(w0) of each path
   RowMajorMatrix incoming(kBatch, 3 * n);  // throughput x Y_j1(w1)
+  constexpr int kConeColumns = ConeTransfer::kWidths * ConeTransfer::kAzimuths * 3;
+  const bool with_cones = !bundle_tangent_.empty();
+  RowMajorMatrix on_cones(with_cones ? kBatch : 0, kConeColumns);  // throughput x F_m(phi) of the path's width
+  Eigen::ArrayXXd harmonics_sum = Eigen::ArrayXXd::Zero(n, 3 * n);
+  Eigen::ArrayXXd moments_sum = Eigen::ArrayXXd::Zero(n, kConeColumns);
   std::vector<float> y1(static_cast<std::size_t>(n));
   int batches = 0;
   for (;;) {
     light.setZero();
     incoming.setZero();
+    on_cones.setZero();
+    int narrow = 0;
+    int wide = 0;
     for (int i = 0; i < kBatch; ++i) {
       const auto path = static_cast<std::uint64_t>(batches) * kBatch + static_cast<std::uint64_t>(i);
       RandomStream random(settings_.seed, RandomStage::kTransfer, cell, path);
@@ -83,16 +112,45 @@ void TransferBaker::bake_cell(std::uint32_t cell, float* matrix, float* standard
 
       const auto first = trace.next(trace.at(origins_->position[segment], segment), w1);
       if (!first) continue;
+      float bundle_variance = 0;
       const auto escape = walk_path(trace, materials_, *first, -w1, Rgb::Ones(), random, limits,
-                                    [](const auto&, const Mat3&, const Vec3&, const Rgb&, int) { return true; });
+                                    [&](const auto& vertex, const Mat3&, const Vec3&, const Rgb&, int) {
+                                      if (with_cones) {
+                                        bundle_variance += vertex.tangent.cross(bundle_tangent_[segment]).squaredNorm();
+                                      }
+                                      return true;
+                                    });
       if (!escape || (!settings_.both_sides && escape->direction.z() <= 0)) continue;
-      evaluate_sh(settings_.order, escape->direction, light.row(i).data());
+      const int width =
+          with_cones ? ConeTransfer::width_of(escape->variance + bundle_variance) : ConeTransfer::kWidths;
+      const bool on_cone = width < ConeTransfer::kWidths;
+      const int row = on_cone ? narrow++ : kBatch - 1 - wide++;
+      evaluate_sh(settings_.order, escape->direction, light.row(row).data());
       evaluate_sh(settings_.order, w1, y1.data());
       for (int j = 0; j < n; ++j) {
-        for (int c = 0; c < 3; ++c) incoming(i, 3 * j + c) = escape->throughput[c] * y1[static_cast<std::size_t>(j)];
+        for (int c = 0; c < 3; ++c) incoming(row, 3 * j + c) = escape->throughput[c] * y1[static_cast<std::size_t>(j)];
+      }
+      if (!on_cone) continue;
+      const Vec3 about = cone_frame(bundle_tangent_[segment]) * w1;
+      const float across = std::hypot(about.y(), about.z());
+      const auto azimuths = azimuth_harmonics(across > 0 ? about.y() / across : 1.0F, across > 0 ? about.z() / across : 0.0F);
+      for (int m = 0; m < ConeTransfer::kAzimuths; ++m) {
+        for (int c = 0; c < 3; ++c) {
+          on_cones(row, 3 * (width * ConeTransfer::kAzimuths + m) + c) =
+              escape->throughput[c] * azimuths[static_cast<std::size_t>(m)];
+        }
       }
     }
-    const Eigen::ArrayXXd mean = (light.transpose() * incoming).array().cast<double>() * (4 * kPi / kBatch);
+    constexpr double kScale = 4 * kPi / kBatch;
+    Eigen::ArrayXXd mean = (light.bottomRows(wide).transpose() * incoming.bottomRows(wide)).array().cast<double>() * kScale;
+    if (narrow > 0) {
+      const Eigen::ArrayXXd part =
+          (light.topRows(narrow).transpose() * incoming.topRows(narrow)).array().cast<double>() * kScale;
+      harmonics_sum += part;
+      moments_sum +=
+          (light.topRows(narrow).transpose() * on_cones.topRows(narrow)).array().cast<double>() * kScale;
+      mean += part;
+    }
     sum += mean;
     sum_of_squares += mean.square();
     ++batches;
@@ -106,16 +164,29 @@ void TransferBaker::bake_cell(std::uint32_t cell, float* matrix, float* standard
     const double brightest = average.row(0).head<3>().maxCoeff();
     if (!last && squared_error.mean() > std::pow(settings_.target_error * brightest, 2)) continue;
     for (int j0 = 0; j0 < n; ++j0) {
-      for (int k = 0; k < 3 * n; ++k) matrix[j0 * 3 * n + k] = static_cast<float>(average(j0, k));
+      for (int k = 0; k < 3 * n; ++k) result.matrix[j0 * 3 * n + k] = static_cast<float>(average(j0, k));
+    }
+    if (with_cones) {
+      constexpr int kWidthColumns = 3 * ConeTransfer::kAzimuths;
+      for (int j0 = 0; j0 < n; ++j0) {
+        for (int k = 0; k < 3 * n; ++k) {
+          result.cone_harmonics[j0 * 3 * n + k] = static_cast<float>(harmonics_sum(j0, k) / batches);
+        }
+        for (int k = 0; k < kConeColumns; ++k) {
+          const int width = k / kWidthColumns;
+          result.cone_moments[(width * n + j0) * kWidthColumns + k % kWidthColumns] =
+              static_cast<float>(moments_sum(j0, k) / batches);
+        }
+      }
     }
     for (int l = 0; l <= settings_.order; ++l) {
       for (int c = 0; c < 3; ++c) {
         double band = 0;
         for (int j1 = l * l; j1 < (l + 1) * (l + 1); ++j1) band += squared_error.col(3 * j1 + c).sum();
-        standard_error[3 * l + c] = static_cast<float>(std::sqrt(band / (n * (2 * l + 1))));
+        result.standard_error[3 * l + c] = static_cast<float>(std::sqrt(band / (n * (2 * l + 1))));
       }
     }
-    *paths = static_cast<std::uint32_t>(batches * kBatch);
+    *result.paths = static_cast<std::uint32_t>(batches * kBatch);
     return;
   }
 }
@@ -131,9 +202,15 @@ TransferChunk TransferBaker::bake(std::uint32_t first_cell, std::uint32_t last_c
   chunk.matrices.resize(count * matrix);
   chunk.standard_error.resize(count * bands);
   chunk.paths.resize(count);
+  const std::size_t moments = ConeTransfer::kWidths * n * ConeTransfer::kAzimuths * 3;
+  if (!bundle_tangent_.empty()) {
+    chunk.cones = ConeTransfer{std::vector<float>(count * matrix), std::vector<float>(count * moments)};
+  }
   tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
-    bake_cell(first_cell + static_cast<std::uint32_t>(i), chunk.matrices.data() + i * matrix,
-              chunk.standard_error.data() + i * bands, chunk.paths.data() + i);
+    bake_cell(first_cell + static_cast<std::uint32_t>(i),
+              {chunk.matrices.data() + i * matrix, chunk.standard_error.data() + i * bands, chunk.paths.data() + i,
+               chunk.cones ? chunk.cones->harmonics.data() + i * matrix : nullptr,
+               chunk.cones ? chunk.cones->moments.data() + i * moments : nullptr});
   });
   return chunk;
 }
@@ -143,11 +220,18 @@ Transfer TransferBaker::assemble(std::span<const TransferChunk> chunks) const {
   transfer.order = settings_.order;
   transfer.cell_of_segment = segment_cells_->cell_of_segment;
   transfer.both_sides = settings_.both_sides;
+  if (!bundle_tangent_.empty()) transfer.cones.emplace();
+  const auto append = [](std::vector<float>& all, const std::vector<float>& some) {
+    all.insert(all.end(), some.begin(), some.end());
+  };
   for (const TransferChunk& chunk : chunks) {
     assert(chunk.first_cell == transfer.paths.size());
-    transfer.matrices.insert(transfer.matrices.end(), chunk.matrices.begin(), chunk.matrices.end());
-    transfer.standard_error.insert(transfer.standard_error.end(), chunk.standard_error.begin(),
-                                   chunk.standard_error.end());
+    append(transfer.matrices, chunk.matrices);
+    append(transfer.standard_error, chunk.standard_error);
+    if (transfer.cones) {
+      append(transfer.cones->harmonics, chunk.cones->harmonics);
+      append(transfer.cones->moments, chunk.cones->moments);
+    }
     transfer.paths.insert(transfer.paths.end(), chunk.paths.begin(), chunk.paths.end());
   }
   assert(transfer.paths.size() == cell_count());

@@ -31,6 +31,38 @@ namespace {
 constexpr int kPolar = 64;
 constexpr int kAzimuths = 64;
 
+// Lights of this sharpness and softer do without cones; from the second on, they use them alone.
+constexpr float kConesFrom = 8;
+constexpr float kConesAlone = 20;
+
+using Lanes = BcsdfTable::Lanes;
+using RgbLanes = BcsdfTable::RgbLanes;
+constexpr int kLanes = Lanes::SizeAtCompileTime;
+constexpr int kAzimuthNodes = 2 * kLanes;
+
+// Points on the circle, and the Fourier series there.
+struct Circle {
+  std::array<float, kAzimuthNodes> cosine;
+  std::array<float, kAzimuthNodes> sine;
+  Eigen::Matrix<float, kAzimuthNodes, ConeTransfer::kAzimuths> harmonics;
+
+  Circle() {
+    for (int n = 0; n < kAzimuthNodes; ++n) {
+      const auto at = static_cast<std::size_t>(n);
+      const float azimuth = 2 * kPif * (static_cast<float>(n) + 0.5F) / kAzimuthNodes;
+      cosine[at] = std::cos(azimuth);
+      sine[at] = std::sin(azimuth);
+      const auto values = azimuth_harmonics(cosine[at], sine[at]);
+      for (int m = 0; m < ConeTransfer::kAzimuths; ++m) harmonics(n, m) = values[static_cast<std::size_t>(m)];
+    }
+  }
+};
+
+const Circle& circle() {
+  static const Circle points;
+  return points;
+}
+
 // Inverse of the distribution of cos(angle to the axis) under a normalised spherical Gaussian.
 double cosine_of_share(double share, double sharpness) {
   if (sharpness < 1e-4) return 1 - 2 * share;
@@ -42,7 +74,10 @@ double cosine_of_share(double share, double sharpness) {
 MultipleScattering::LightShape::LightShape(std::optional<float> sharpness, FaceLight face_light)
     : directional_(!sharpness), face_light_(face_light) {
   band_.fill(1);
+  if (face_light == FaceLight::kPrinted) cone_share_ = 0;
   if (!sharpness) return;
+  cone_share_ *= std::clamp((*sharpness - kConesFrom) / (kConesAlone - kConesFrom), 0.0F, 1.0F);
+  variance_ = 1 / std::max(*sharpness, kConesFrom);
   const std::vector<double> ratios = spherical_bessel_ratios(kMaxShOrder, *sharpness);
   std::transform(ratios.begin(), ratios.end(), band_.begin(), [](double a) { return static_cast<float>(a); });
 
@@ -120,10 +155,57 @@ void MultipleScattering::LightShape::moments_above(int order, const Vec3& axis, 
 }
 
 void MultipleScattering::incoming(std::uint32_t cell, const LightShape& light, const Vec3& axis,
-                                  IncomingField& field) const {
+                                  CellLight& result) const {
   std::array<float, sh_count(kMaxShOrder)> coefficients;
   light.project(transfer_->order, transfer_->both_sides, axis, coefficients.data());
-  transfer_->incoming(cell, coefficients.data(), field.data());
+  transfer_->incoming(cell, coefficients.data(), light.cone_share(), result.harmonics.data());
+  if (transfer_->cones && light.cone_share() > 0) {
+    transfer_->incoming_on_cones(cell, coefficients.data(), result.cones.data());
+  }
+}
+
+Rgb MultipleScattering::outgoing_from_cones(const CellLight& incoming, const LightShape& light, const Vec3& axis,
+                                            std::uint32_t segment, std::uint16_t material, const Vec3& tangent,
+                                            const Vec3& wo) const {
+  if (!transfer_->cones || !(light.cone_share() > 0)) return Rgb::Zero();
+  // Directions on the light's cone about the bundle, in wo-space.
+  const Mat3 bundle = cone_frame(bundle_tangent_[segment]);
+  const Mat3 turn = wo_space(tangent, wo) * bundle.transpose();
+  const float along = std::clamp(axis.dot(bundle_tangent_[segment]), -1.0F, 1.0F);
+  const float across = std::sqrt(1 - along * along);
+  const Circle& points = circle();
+  std::array<Lanes, 2> theta_i;
+  std::array<Lanes, 2> cos_turn;
+  for (int n = 0; n < kAzimuthNodes; ++n) {
+    const auto at = static_cast<std::size_t>(n);
+    const Vec3 w = turn * Vec3(along, across * points.cosine[at], across * points.sine[at]);
+    const float from_tangent = std::hypot(w.y(), w.z());
+    theta_i[at / kLanes][n % kLanes] = std::atan2(w.x(), from_tangent);
+    cos_turn[at / kLanes][n % kLanes] = from_tangent > 0 ? w.y() / from_tangent : 1.0F;
+  }
+  const float theta_o = std::asin(std::clamp(wo.dot(tangent), -1.0F, 1.0F));
+
+  using Moments = Eigen::Matrix<float, ConeTransfer::kAzimuths, 3, Eigen::RowMajor>;
+  Rgb sum = Rgb::Zero();
+  for (int width = 0; width < ConeTransfer::kWidths; ++width) {
+    const Eigen::Map<const Moments> moments(incoming.cones.data() + width * ConeTransfer::kAzimuths * 3);
+    const Eigen::Matrix<float, kAzimuthNodes, 3> arriving = points.harmonics * moments;
+    const float variance = ConeTransfer::variance_of(width) + light.variance();
+    for (int half = 0; half < 2; ++half) {
+      const RgbLanes lanes = arriving.middleRows<kLanes>(half * kLanes).array();
+      const auto at = static_cast<std::size_t>(half);
+      sum += materials_[material].blurred_scatter(theta_i[at], cos_turn[at], theta_o, variance, lanes);
+    }
+  }
+  return light.cone_share() * (2 * kPif / kAzimuthNodes) * sum;
+}
+
+Rgb MultipleScattering::radiance(const LightShape& light, const Vec3& axis, std::uint32_t segment,
+                                 std::uint16_t material, const Vec3& tangent, const Vec3& wo) const {
+  CellLight arriving;
+  incoming(transfer_->cell_of_segment[segment], light, axis, arriving);
+  return outgoing(arriving.harmonics, material, tangent, wo) +
+         outgoing_from_cones(arriving, light, axis, segment, material, tangent, wo);
 }
 
 Rgb MultipleScattering::outgoing(const IncomingField& field, std::uint16_t material, const Vec3& tangent,

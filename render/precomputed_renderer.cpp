@@ -106,7 +106,7 @@ PrecomputedRenderer::PrecomputedRenderer(const ClothScene& scene, std::span<cons
         first.dual = std::make_shared<const DualScattering>(scene.tile(cloth), pack.materials);
       } else {
         first.single = single_scattering_of(pack, settings.shading, settings.blend);
-        first.multiple.emplace(*pack.transfer, pack.materials);
+        first.multiple.emplace(*pack.transfer, pack.materials, pack.bundle_tangent);
       }
     }
     cloths_.push_back(known->second);
@@ -239,7 +239,7 @@ void PrecomputedRenderer::shade(const Camera& camera, const PixelRect& block, in
     std::uint32_t cloth = 0xffffffffU;
     std::uint32_t cell = 0;
     Vec3 axis;
-    IncomingField field;
+    CellLight light;
   };
   std::vector<KeptField> kept(lights_.size());
   for (const std::uint32_t k : order) {
@@ -276,12 +276,15 @@ void PrecomputedRenderer::shade(const Camera& camera, const PixelRect& block, in
         own.cloth = hit.cloth;
         own.cell = point.cell;
         own.axis = axis.fabric;
-        cloth.multiple->incoming(point.cell, shapes_[l], axis.fabric, own.field);
+        cloth.multiple->incoming(point.cell, shapes_[l], axis.fabric, own.light);
       }
-      for (int j = 0; j < values; ++j) field[j] += light.irradiance[j % 3] * own.field[j];
+      for (int j = 0; j < values; ++j) field[j] += light.irradiance[j % 3] * own.light.harmonics[j];
+      sample.multiple += light.irradiance * cloth.multiple->outgoing_from_cones(own.light, shapes_[l], axis.fabric,
+                                                                                point.segment, point.material,
+                                                                                point.tangent.fabric, point.wo.fabric);
     }
     if (any_nearby) {
-      sample.multiple = cloth.multiple->outgoing(field, point.material, point.tangent.fabric, point.wo.fabric);
+      sample.multiple += cloth.multiple->outgoing(field, point.material, point.tangent.fabric, point.wo.fabric);
     }
   }
 }

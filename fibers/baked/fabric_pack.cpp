@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <string_view>
 
+#include "fibers/cloth/bundle_tangents.h"
 #include "formats/atomic_file.h"
 #include "formats/content_hash.h"
 #include "formats/input_error.h"
@@ -153,6 +154,7 @@ FabricPack load_pack(const std::filesystem::path& folder) {
   if (manifest.files.contains("transfer.safetensors")) {
     pack.transfer = read_transfer(folder / "transfer.safetensors");
     require_rows(pack.transfer->cell_of_segment.size(), "transfer.safetensors");
+    if (pack.transfer->cones) pack.bundle_tangent = bundle_tangents(pack.exemplar);
   }
   if (manifest.files.contains("volume.vdb")) {
     pack.volume = read_id_volume(folder / "volume.vdb");

@@ -50,6 +50,7 @@ struct FabricPack {
   std::optional<SsdfVisibility> ssdf;
   std::optional<SgVisibility> sgs;
   std::optional<Transfer> transfer;
+  std::vector<Vec3> bundle_tangent;  // [segment], where the transfer has cones
   std::optional<IdVolume> volume;
   std::vector<BcsdfTable> materials;           // [material]
 };

@@ -7,13 +7,40 @@
 
 namespace heddle {
 
+namespace {
+
+using RowMajorMatrix = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+/// The `index`-th of matrices of `rows` x `columns` stored one after the other.
+Eigen::Map<const RowMajorMatrix> matrix_at(const std::vector<float>& values, std::size_t index, int rows, int columns) {
+  return {values.data() + index * static_cast<std::size_t>(rows * columns), rows, columns};
+}
+
+}  // namespace
+
 void Transfer::incoming(std::uint32_t cell, const float* light, float* result) const {
   const int n = coefficients();
-  const int row = 3 * n;
-  const float* a = matrices.data() + static_cast<std::size_t>(cell) * static_cast<std::size_t>(n * row);
-  Eigen::Map<const Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> matrix(a, n, row);
   Eigen::Map<const Eigen::RowVectorXf> c_light(light, n);
-  Eigen::Map<Eigen::RowVectorXf>(result, row).noalias() = c_light * matrix;
+  Eigen::Map<Eigen::RowVectorXf>(result, 3 * n).noalias() = c_light * matrix_at(matrices, cell, n, 3 * n);
+}
+
+void Transfer::incoming(std::uint32_t cell, const float* light, float cone_share, float* result) const {
+  incoming(cell, light, result);
+  if (!cones || !(cone_share > 0)) return;
+  const int n = coefficients();
+  Eigen::Map<const Eigen::RowVectorXf> c_light(light, n);
+  Eigen::Map<Eigen::RowVectorXf>(result, 3 * n).noalias() -= cone_share * c_light * matrix_at(cones->harmonics, cell, n, 3 * n);
+}
+
+void Transfer::incoming_on_cones(std::uint32_t cell, const float* light, float* result) const {
+  constexpr int kRow = 3 * ConeTransfer::kAzimuths;
+  const int n = coefficients();
+  Eigen::Map<const Eigen::RowVectorXf> c_light(light, n);
+  for (int width = 0; width < ConeTransfer::kWidths; ++width) {
+    const std::size_t index = static_cast<std::size_t>(cell) * ConeTransfer::kWidths + static_cast<std::size_t>(width);
+    Eigen::Map<Eigen::RowVectorXf>(result + width * kRow, kRow).noalias() =
+        c_light * matrix_at(cones->moments, index, n, kRow);
+  }
 }
 
 void write_transfer(const std::filesystem::path& path, const Transfer& t,
@@ -28,6 +55,10 @@ void write_transfer(const std::filesystem::path& path, const Transfer& t,
   file.add<float>("matrices", {t.cell_count(), n, n, 3}, t.matrices);
   file.add<float>("standard_error", {t.cell_count(), bands, 3}, t.standard_error);
   file.add<std::uint32_t>("paths", {t.cell_count()}, t.paths);
+  if (t.cones) {
+    file.add<float>("cone_harmonics", {t.cell_count(), n, n, 3}, t.cones->harmonics);
+    file.add<float>("cone_moments", {t.cell_count(), ConeTransfer::kWidths, n, ConeTransfer::kAzimuths, 3}, t.cones->moments);
+  }
   file.write(path);
 }
 
@@ -47,6 +78,11 @@ Transfer read_transfer(const std::filesystem::path& path) {
   t.matrices = file.get<float>("matrices", {count, n, n, 3});
   t.standard_error = file.get<float>("standard_error", {count, error_shape[1], 3});
   t.paths = file.get<std::uint32_t>("paths", {count});
+  if (file.entries().contains("cone_moments")) {
+    t.cones = ConeTransfer{
+        file.get<float>("cone_harmonics", {count, n, n, 3}),
+        file.get<float>("cone_moments", {count, ConeTransfer::kWidths, n, ConeTransfer::kAzimuths, 3})};
+  }
   t.cell_of_segment = file.get<std::uint32_t>("cell_of_segment", {file.shape("cell_of_segment").at(0)});
   for (const std::uint32_t cell : t.cell_of_segment) {
     if (cell >= count) throw FileError(fmt::format("{}: cell {} of {}", path.string(), cell, count));

@@ -8,9 +8,11 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "fibers/baked/cone_transfer.h"
 #include "fibers/math/vector.h"
 
 namespace heddle {
@@ -22,12 +24,17 @@ struct Transfer {
   std::vector<float> matrices;        // [cell][j0][j1][rgb]
   std::vector<float> standard_error;  // [cell][band of j1][rgb]: rms over the entries of the band
   std::vector<std::uint32_t> paths;   // [cell] paths spent
+  std::optional<ConeTransfer> cones;  // a finer model of some of the light that `matrices` hold
 
   std::uint32_t cell_count() const { return static_cast<std::uint32_t>(paths.size()); }
   int coefficients() const { return (order + 1) * (order + 1); }
 
   /// c_T = a^T c_light for one cell: light [j0] -> incoming [j1][rgb].
   void incoming(std::uint32_t cell, const float* light, float* result) const;
+  /// The same less `cone_share` of what the cones model.
+  void incoming(std::uint32_t cell, const float* light, float cone_share, float* result) const;
+  /// Light on the cones: light [j0] -> [width][azimuth][rgb]. Needs `cones`.
+  void incoming_on_cones(std::uint32_t cell, const float* light, float* result) const;
 };
 
 void write_transfer(const std::filesystem::path& path, const Transfer& transfer,

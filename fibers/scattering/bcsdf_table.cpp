@@ -227,7 +227,7 @@ BcsdfTable::Sample BcsdfTable::sample(const Vec3& wo, RandomStream& random, cons
     const float x = sample_disk(random).x();
     const float phi = 2.0F * kPif * random.uniform();
     const float cosine = std::sqrt(std::max(0.0F, 1.0F - x * x));
-    return {Vec3(x, cosine * std::cos(phi), cosine * std::sin(phi)), Rgb::Ones(), cosine / (kPif * kPif)};
+    return {Vec3(x, cosine * std::cos(phi), cosine * std::sin(phi)), Rgb::Ones(), cosine / (kPif * kPif), kPif};
   }
   const Inclination out(wo);
   const float probability = probability_of_r(out.theta, importance);
@@ -243,7 +243,7 @@ BcsdfTable::Sample BcsdfTable::sample(const Vec3& wo, RandomStream& random, cons
   const float density =
       sampling_density(d, out, probability);  // per d theta_i d phi_i, so pdf = density / cos(theta_i)
   return {Vec3(in.sine, in.cosine * in.azimuth.x(), in.cosine * in.azimuth.y()),
-          value(d, in) * (in.cosine * in.cosine / density), density / in.cosine};
+          value(d, in) * (in.cosine * in.cosine / density), density / in.cosine, is_r ? r_.beta : tt_.beta};
 }
 
 Rgb BcsdfTable::sg_scatter(const Vec3& axis, float sharpness, const Vec3& wo) const {
@@ -344,6 +344,35 @@ Rgb BcsdfTable::sg_scatter(const Vec3& axis, float sharpness, const Vec3& wo) co
   if (fiber_.isotropic_white) return Rgb::Constant(r);
   // azimuth_norm_ is 1 / (2 pi I0e(k)).
   return color_r_ * r + (1.0F - color_r_) * (r_schlick + tt * (2.0F * kPif * azimuth_norm_) * color_tt_);
+}
+
+Rgb BcsdfTable::blurred_scatter(const Lanes& theta_i, const Lanes& cos_turn, float theta_o, float variance,
+                                const RgbLanes& light) const {
+  if (fiber_.isotropic_white) {
+    // S = 1 / pi^2, and the mean of the cosine over the Gaussian.
+    const Lanes response = theta_i.cos() * (std::exp(-0.5F * variance) / (kPif * kPif));
+    return (light.colwise() * response).colwise().sum().transpose();
+  }
+  const Lanes from_cone = theta_i + theta_o;
+  // Each lobe without its colours: value, and value times Schlick's weight.
+  const auto lobe_response = [&](const LongitudinalLobe& lobe, Lanes& schlick) {
+    const float total = variance + lobe.beta * lobe.beta;
+    const Lanes theta = (theta_i - from_cone * (variance / total)).max(-kHalfPi).min(kHalfPi);
+    const Lanes cosine = theta.cos().max(0.0F);
+    const Lanes drop = 1.0F - cosine;
+    schlick = drop.square().square() * drop;
+    Lanes response = (from_cone.square() * (-0.5F / total)).exp() * cosine * (1 / std::sqrt(2 * kPif * total));
+    for (int lane = 0; lane < Lanes::SizeAtCompileTime; ++lane) {
+      response[lane] /= lobe.cos2_mean(cosine[lane], kHalfPi - std::abs(theta[lane]));
+    }
+    return response;
+  };
+  Lanes schlick_r;
+  Lanes schlick_tt;
+  const Lanes r = lobe_response(r_, schlick_r) * (0.5F / kPif);
+  const Lanes tt = lobe_response(tt_, schlick_tt) * azimuth_norm_ * (-k_ * (1.0F + cos_turn)).exp();
+  const auto sum = [&](const Lanes& weight) -> Rgb { return (light.colwise() * weight).colwise().sum().transpose(); };
+  return color_r_ * sum(r) + (1.0F - color_r_) * (sum(r * schlick_r) + color_tt_ * sum(tt * (1.0F - schlick_tt)));
 }
 
 void BcsdfTable::sh_coefficients(float theta_o, int order, float* out) const {

@@ -39,6 +39,7 @@ class BcsdfTable {
     Vec3 wi;
     Rgb weight;  // S(wi, wo) cos(theta_i) / pdf; 1 for the isotropic white fiber
     float pdf;
+    float deviation;  // beta of the lobe that was drawn, radians; pi for the isotropic white fiber
   };
   /// importance: not negative; all zero counts as one.
   Sample sample(const Vec3& wo, RandomStream& random, const Rgb& importance = Rgb::Ones()) const;
@@ -46,6 +47,14 @@ class BcsdfTable {
 
   /// Gamma of sg_scatter.h by SgMethod::kDefault, for a unit axis and sharpness >= 0.
   Rgb sg_scatter(const Vec3& axis, float sharpness, const Vec3& wo) const;
+
+  using Lanes = Eigen::Array<float, 8, 1>;
+  using RgbLanes = Eigen::Array<float, 8, 3>;
+  /// Scattered towards inclination theta_o from light that is Gaussian in inclination: sum over the lanes of
+  /// light * integral of S cos(theta) N(theta; theta_i, variance) dtheta, theta_i per lane, variance > 0, cos_turn the cosine of the lane's
+  /// azimuth from wo's. The product of Gaussians is exact, the factors beside it are taken at its mean.
+  Rgb blurred_scatter(const Lanes& theta_i, const Lanes& cos_turn, float theta_o, float variance,
+                      const RgbLanes& light) const;
 
   /// bcsdf_sh by linear interpolation between rows. out: [(order + 1)^2][3], order <= kMaxOrder. Error 1e-4,
   /// but where an end of [-pi/2, pi/2] cuts a narrow lobe: 2e-3 at beta = 1 degree, 0.1 at 0.1 degrees.

@@ -28,12 +28,14 @@ struct WalkLimits {
 };
 
 /// Where a path left the cloth: direction (towards the light), throughput, the density with which the last direction was
-/// drawn (1/sr), and the number of scattering events.
+/// drawn (1/sr), the number of scattering events, and the sum of the variances of the lobes that scattered it (of inclination about
+/// each fiber's cone, square radians).
 struct PathEscape {
   Vec3 direction;
   Rgb throughput;
   float pdf;
   int scatterings;
+  float variance;
 };
 
 /// Follows the path that arrives at `vertex` and leaves it towards `wo` with the given throughput.
@@ -44,12 +46,14 @@ template <class Trace, class AtVertex>
 std::optional<PathEscape> walk_path(const Trace& trace, std::span<const BcsdfTable> materials,
                                     typename Trace::Vertex vertex, Vec3 wo, Rgb throughput, RandomStream& random,
                                     const WalkLimits& limits, AtVertex&& at_vertex) {
+  float variance = 0;
   for (int n = 1; n <= limits.max_scatterings; ++n) {
     const Mat3 frame = frame_about(vertex.tangent);
     if (!at_vertex(vertex, frame, wo, throughput, n)) return {};
     const BcsdfTable& bcsdf = materials[vertex.material];
     const auto sample = bcsdf.sample(frame.transpose() * wo, random, throughput);
     throughput *= sample.weight;
+    variance += sample.deviation * sample.deviation;
     if (n >= limits.roulette_from) {
       const float survival = std::min(1.0F, throughput.maxCoeff());
       if (!(random.uniform() < survival)) return {};
@@ -59,7 +63,7 @@ std::optional<PathEscape> walk_path(const Trace& trace, std::span<const BcsdfTab
     }
     const Vec3 wi = frame * sample.wi;
     std::optional<typename Trace::Vertex> next = trace.next(vertex, wi);
-    if (!next) return PathEscape{wi, throughput, sample.pdf, n};
+    if (!next) return PathEscape{wi, throughput, sample.pdf, n, variance};
     vertex = *next;
     wo = -wi;
   }

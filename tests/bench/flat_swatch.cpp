@@ -1,7 +1,7 @@
 // How far the precomputed methods are from path tracing on a flat, endless cloth: 41 views x 12 directional lights, as in
 // Figure 13 of Khungurn 2017. Not a test: it prints, and writes PREFIX.csv (every value) and PREFIX.svg (curves).
 //
-//   heddle_flat_swatch PACK [--printed PACK] [--paths N] [--floor-paths K] [--sharpness L] [--seed S] [--out PREFIX]
+//   heddle_flat_swatch PACK [--printed PACK] [--paths N] [--floor-paths K] [--sharpness L] [--no-rivals] [--seed S] [--out PREFIX]
 //
 // Views: theta_o = -80, -76, .. 80 degrees in the xz plane. Lights: theta = 10, 30, 50, 70 degrees at azimuths 0, 60, 135
 // degrees from +x, irradiance 1 across the light's axis; with --sharpness spherical Gaussians about the same axes, for which the
@@ -107,6 +107,7 @@ struct Options {
   std::string pack;
   std::string printed;  // the pack of `printed`; that method is left out where empty
   std::optional<float> sharpness;  // of the lights; directional where absent
+  bool rivals = true;
   int paths = 4096;
   int floor_paths = 4;
   std::uint64_t seed = 1;
@@ -127,7 +128,7 @@ class Swatch {
             find_segment_origins(scene_, pack.light_from_both_sides, OriginChoice::kExposed, options.seed)),
         bricks_(*pack.volume),
         single_(&*pack.ssdf, pack.sgs ? &*pack.sgs : nullptr, pack.materials),
-        multiple_(*pack.transfer, pack.materials),
+        multiple_(*pack.transfer, pack.materials, pack.bundle_tangent),
         shape_(options.sharpness),
         printed_shape_(options.sharpness, LightShape::FaceLight::kPrinted),
         prt_(*pack.ssdf, pack.light_from_both_sides, pack.materials),
@@ -150,6 +151,7 @@ class Swatch {
   }
 
   bool has(int method) const {
+    if (!options_.rivals && method >= kPath6) return false;
     if (method == kFloor) return !options_.sharpness;
     return method != kPrinted || printed_ != nullptr;
   }
@@ -180,7 +182,7 @@ class Swatch {
         for (int k = 0; k < options_.floor_paths && has(kFloor); ++k) {
           add_floor_multiple(*vertex, wo, random, scale / options_.floor_paths, sum[kFloor][kMultiple]);
         }
-        add_rivals(*vertex, wo, towards, scale, sum);
+        if (options_.rivals) add_rivals(*vertex, wo, towards, scale, sum);
       }
       if (const auto hit = bricks_.first_hit({origin, -wo})) {
         add_precomputed(hit->segment, exemplar.segment_tangent(hit->segment), wo, scale, sum[kVolume]);
@@ -240,10 +242,8 @@ class Swatch {
     point.cell = printed_->transfer->cell_of_segment[hit.segment];
     for (int l = 0; l < kLights; ++l) {
       sum[kPrinted][kSingle][l] += scale * single_of(*printed_single_, point, l).cast<double>();
-      IncomingField field;
-      printed_multiple_->incoming(point.cell, printed_shape_, lights_[l], field);
       sum[kPrinted][kMultiple][l] +=
-          scale * printed_multiple_->outgoing(field, point.material, hit.tangent, wo).cast<double>();
+          scale * printed_multiple_->radiance(printed_shape_, lights_[l], hit.segment, point.material, hit.tangent, wo).cast<double>();
     }
   }
 
@@ -260,9 +260,7 @@ class Swatch {
                                 {wo, wo}};
     for (int l = 0; l < kLights; ++l) {
       parts[kSingle][l] += scale * single_of(single_, point, l).cast<double>();
-      IncomingField field;
-      multiple_.incoming(point.cell, shape_, lights_[l], field);
-      parts[kMultiple][l] += scale * multiple_.outgoing(field, point.material, tangent, wo).cast<double>();
+      parts[kMultiple][l] += scale * multiple_.radiance(shape_, lights_[l], segment, point.material, tangent, wo).cast<double>();
     }
   }
 
@@ -531,6 +529,7 @@ int main(int argc, char** argv) {
   app.add_option("--printed", options.printed, "pack of the same fabric, baked for the method `printed`");
   app.add_option("--sharpness", options.sharpness, "spherical Gaussians in place of directional lights")
       ->check(CLI::NonNegativeNumber);
+  app.add_flag("!--no-rivals", options.rivals, "exact, volume, origin and floor only");
   app.add_option("--paths", options.paths, "eye rays per view, both halves together")
       ->check(CLI::Range(2, 100'000'000));
   app.add_option("--floor-paths", options.floor_paths, "paths for the floor, per eye ray")

@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "fibers/cloth/bundle_tangents.h"
 #include "fibers/cloth/synthesize.h"
 #include "fibers/math/spherical_harmonics.h"
 #include "fibers/tracing/path_walk.h"
@@ -94,6 +95,87 @@ TEST(TransferBakeLaw, FaceLightIsPartOfLightFromBothSides) {
     EXPECT_LE(a.matrices[i], b.matrices[i] * (1 + 1e-5F));  // the same paths, some dropped
     EXPECT_GE(a.matrices[i], 0);
   }
+}
+
+/// Parallel filaments in a loose stack, slightly wandering.
+Exemplar filaments() {
+  std::vector<Vec2> places;
+  for (int y = 0; y < 6; ++y) {
+    for (int z = 0; z < 4; ++z) places.emplace_back(0.03F * (static_cast<float>(y) + 0.5F), 0.03F * static_cast<float>(z));
+  }
+  FiberScattering silk;
+  silk.color_r = Rgbd(0.7, 0.2, 0.1);
+  silk.color_tt = Rgbd(0.6, 0.5, 0.5);
+  silk.beta_r = radians(1);
+  silk.beta_tt = radians(10);
+  silk.gamma_tt = radians(20);
+  Exemplar exemplar = test::straight_fibers(0.6F, 0.18F, places, 0.01F, 12, silk);
+  RandomStream random(5, RandomStage::kTest, 1, 0);
+  // Both ends of a fiber stay where they are: it is periodic.
+  for (std::size_t f = 0; f + 1 < exemplar.first_point.size(); ++f) {
+    for (std::uint32_t p = exemplar.first_point[f] + 1; p + 1 < exemplar.first_point[f + 1]; ++p) {
+      exemplar.points[p].tail<2>() += 0.002F * sample_disk(random);
+    }
+  }
+  index_segments(exemplar);
+  return exemplar;
+}
+
+TEST(TransferBakeLaw, ConesSortPathsAndLoseNone) {
+  const Exemplar exemplar = filaments();
+  const TileScene scene(exemplar);
+  const std::vector<BcsdfTable> materials = {BcsdfTable(exemplar.scattering[0])};
+  const SegmentOrigins origins = find_segment_origins(scene, false, OriginChoice::kExposed, 1);
+  const SegmentCells cells = make_segment_cells(exemplar, origins, 0.1F);
+  TransferSettings settings = settings_of(3, 8192, false);
+  settings.cones = TransferSettings::Cones::kOff;
+  const TransferChunk without = TransferBaker(scene, materials, origins, settings, cells).bake(0, cells.count);
+  EXPECT_FALSE(without.cones.has_value());
+  settings.cones = TransferSettings::Cones::kAuto;  // these fibers are parallel and specular
+  const TransferChunk with = TransferBaker(scene, materials, origins, settings, cells).bake(0, cells.count);
+  ASSERT_TRUE(with.cones.has_value());
+
+  // The matrices are those of all paths, to rounding.
+  double largest = 0;
+  double difference = 0;
+  for (std::size_t i = 0; i < with.matrices.size(); ++i) {
+    largest = std::max(largest, std::abs(static_cast<double>(without.matrices[i])));
+    difference = std::max(difference, std::abs(static_cast<double>(with.matrices[i]) - without.matrices[i]));
+  }
+  EXPECT_LT(difference, 1e-5 * largest);
+
+  // Over all azimuths, f_d is sqrt(2 pi) times its constant's coefficient; the mean over directions has Y_0 = 1 / sqrt(4 pi) before it.
+  constexpr std::size_t n = 16;
+  double on_cones = 0;
+  double all = 0;
+  for (std::size_t cell = 0; cell < cells.count; ++cell) {
+    for (std::size_t j0 = 0; j0 < n; ++j0) {
+      for (std::size_t c = 0; c < 3; ++c) {
+        double moments = 0;
+        for (std::size_t d = 0; d < ConeTransfer::kWidths; ++d) {
+          moments += with.cones->moments[((cell * ConeTransfer::kWidths + d) * n + j0) * ConeTransfer::kAzimuths * 3 + c];
+        }
+        EXPECT_NEAR(with.cones->harmonics[((cell * n + j0) * n) * 3 + c], moments * std::sqrt(0.5), 1e-5 * largest);
+      }
+    }
+    on_cones += with.cones->harmonics[cell * n * n * 3];
+    all += with.matrices[cell * n * n * 3];
+  }
+  // Red light reflects at 1 degree and wander is 2 to 3 degrees: most of the light stays on cones, but light through fibers (10 degrees each) does not for long.
+  EXPECT_GT(on_cones, 0.3 * all);
+  EXPECT_LT(on_cones, 0.95 * all);
+}
+
+TEST(TransferBakeLaw, ConesAreKeptWhereFilamentsAreParallelAndSpecular) {
+  Exemplar exemplar = filaments();
+  EXPECT_TRUE(keeps_light_on_cones(exemplar, bundle_tangents(exemplar)));
+  exemplar.scattering[0].beta_r = radians(4);
+  EXPECT_FALSE(keeps_light_on_cones(exemplar, bundle_tangents(exemplar)));
+  exemplar.scattering[0].beta_r = radians(1);
+  RandomStream random(5, RandomStage::kTest, 2, 0);
+  for (Vec3& point : exemplar.points) point.tail<2>() += 0.008F * sample_disk(random);
+  index_segments(exemplar);
+  EXPECT_FALSE(keeps_light_on_cones(exemplar, bundle_tangents(exemplar)));
 }
 
 TEST(TransferBakeLaw, AnyCutAndAnyThreadCountGiveTheSameBits) {

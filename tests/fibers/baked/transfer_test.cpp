@@ -2,9 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <filesystem>
 
 #include "fibers/math/random.h"
+#include "fibers/math/sampling.h"
 #include "formats/input_error.h"
 #include "tests/support/temporary_folder.h"
 
@@ -38,6 +40,88 @@ TEST(TransferLaw, IncomingSumsOverTheLightIndex) {
   }
 }
 
+/// The same with cones of random numbers.
+Transfer random_transfer_with_cones() {
+  Transfer t = random_transfer();
+  RandomStream random(1, RandomStage::kTest, 22, 0);
+  t.cones.emplace();
+  for (std::size_t i = 0; i < t.matrices.size(); ++i) t.cones->harmonics.push_back(random.uniform() - 0.5F);
+  for (std::size_t i = 0; i < 8 * ConeTransfer::kWidths * 9 * ConeTransfer::kAzimuths * 3; ++i) {
+    t.cones->moments.push_back(random.uniform() - 0.5F);
+  }
+  return t;
+}
+
+TEST(TransferLaw, ConesLeaveTheHarmonicsByTheirShare) {
+  const Transfer t = random_transfer_with_cones();
+  std::vector<float> light(9);
+  for (std::size_t j = 0; j < 9; ++j) light[j] = static_cast<float>(j) - 3.5F;
+  std::vector<float> whole(27);
+  std::vector<float> less(27);
+  t.incoming(5, light.data(), whole.data());
+  t.incoming(5, light.data(), 0.75F, less.data());
+  std::vector<float> cones(ConeTransfer::kWidths * ConeTransfer::kAzimuths * 3);
+  t.incoming_on_cones(5, light.data(), cones.data());
+  for (std::size_t k = 0; k < 27; ++k) {
+    double sum = 0;
+    for (std::size_t j0 = 0; j0 < 9; ++j0) sum += t.cones->harmonics[(5 * 9 + j0) * 27 + k] * light[j0];
+    EXPECT_NEAR(less[k], whole[k] - 0.75 * sum, 1e-5);
+  }
+  constexpr std::size_t kRow = ConeTransfer::kAzimuths * 3;
+  for (std::size_t k = 0; k < cones.size(); ++k) {
+    double sum = 0;
+    for (std::size_t j0 = 0; j0 < 9; ++j0) {
+      sum += t.cones->moments[((5 * ConeTransfer::kWidths + k / kRow) * 9 + j0) * kRow + k % kRow] * light[j0];
+    }
+    EXPECT_NEAR(cones[k], sum, 1e-5);
+  }
+}
+
+TEST(ConeTransferLaw, WidthsFollowTheLimits) {
+  const auto variance = [](double degrees) { return static_cast<float>(std::pow(degrees * kPi / 180, 2)); };
+  EXPECT_EQ(ConeTransfer::width_of(0), 0);
+  for (int width = 0; width < ConeTransfer::kWidths; ++width) {
+    const double limit = ConeTransfer::kLimitDegrees[static_cast<std::size_t>(width)];
+    EXPECT_EQ(ConeTransfer::width_of(variance(limit * 0.999)), width);
+    EXPECT_EQ(ConeTransfer::width_of(variance(limit * 1.001)), width + 1);
+    EXPECT_NEAR(ConeTransfer::variance_of(width), variance(ConeTransfer::kDeviationDegrees[static_cast<std::size_t>(width)]), 1e-6);
+  }
+}
+
+TEST(ConeTransferLaw, AzimuthHarmonicsAreOrthonormal) {
+  constexpr int kPoints = 32;
+  Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(ConeTransfer::kAzimuths, ConeTransfer::kAzimuths);
+  for (int k = 0; k < kPoints; ++k) {
+    const double azimuth = 2 * kPi * k / kPoints;
+    const auto values = azimuth_harmonics(static_cast<float>(std::cos(azimuth)), static_cast<float>(std::sin(azimuth)));
+    const Eigen::Map<const Eigen::VectorXf> row(values.data(), ConeTransfer::kAzimuths);
+    gram += (row * row.transpose()).cast<double>() * (2 * kPi / kPoints);
+  }
+  EXPECT_LT((gram - Eigen::MatrixXd::Identity(gram.rows(), gram.cols())).cwiseAbs().maxCoeff(), 1e-6);
+}
+
+TEST(ConeTransferLaw, FramesAreRotationsAboutTheBundle) {
+  RandomStream random(1, RandomStage::kTest, 23, 0);
+  for (int i = 0; i < 200; ++i) {
+    const Vec3 tangent = i == 0 ? Vec3(Vec3::UnitZ()) : i == 1 ? Vec3(-Vec3::UnitZ()) : sample_sphere(random);
+    const Mat3 axes = cone_frame(tangent);
+    EXPECT_LT((axes * axes.transpose() - Mat3::Identity()).norm(), 1e-5F);
+    EXPECT_NEAR(axes.determinant(), 1, 1e-5);
+    EXPECT_LT((Vec3(axes.row(0)) - tangent).norm(), 1e-6F);
+    EXPECT_GE(axes(1, 2), -1e-6F);  // y looks up
+  }
+}
+
+TEST(TransferFormat, ConesRoundTrip) {
+  const Transfer a = random_transfer_with_cones();
+  const TemporaryFolder folder;
+  write_transfer(folder.path() / "transfer.safetensors", a, {});
+  const Transfer b = read_transfer(folder.path() / "transfer.safetensors");
+  ASSERT_TRUE(b.cones.has_value());
+  EXPECT_EQ(a.cones->harmonics, b.cones->harmonics);
+  EXPECT_EQ(a.cones->moments, b.cones->moments);
+}
+
 TEST(TransferFormat, RoundTrip) {
   const Transfer a = random_transfer();
   const TemporaryFolder folder;
@@ -49,6 +133,7 @@ TEST(TransferFormat, RoundTrip) {
   EXPECT_EQ(a.cell_of_segment, b.cell_of_segment);
   EXPECT_EQ(b.order, 2);
   EXPECT_FALSE(b.both_sides);
+  EXPECT_FALSE(b.cones.has_value());
 }
 
 TEST(TransferFormat, ACellThatIsNotThereIsAnError) {

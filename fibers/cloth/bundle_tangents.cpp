@@ -1,0 +1,87 @@
+#include "fibers/cloth/bundle_tangents.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace heddle {
+namespace {
+
+constexpr float kBundleRadii = 4;
+constexpr float kLeastCosine = 0.9F;  // between tangents of one bundle
+
+}  // namespace
+
+std::vector<Vec3> bundle_tangents(const Exemplar& exemplar) {
+  const auto segments = static_cast<std::uint32_t>(exemplar.segment_count());
+  std::vector<Vec3> midpoint(segments);
+  std::vector<Vec3> tangent(segments);
+  float reach = 0;
+  for (std::uint32_t s = 0; s < segments; ++s) {
+    midpoint[s] = exemplar.segment_midpoint(s);
+    tangent[s] = exemplar.segment_tangent(s);
+    reach = std::max(reach, kBundleRadii * exemplar.radius_mm[exemplar.segment_fiber[s]]);
+  }
+
+  // Columns over the period, at least `reach` wide, so that a segment's neighbours lie in its own column and those around it.
+  const auto columns = [reach](float period) { return std::max(1, static_cast<int>(period / reach)); };
+  const int nx = columns(exemplar.width_mm);
+  const int ny = columns(exemplar.height_mm);
+  const auto column_of = [](float place, float period, int count) {
+    const float share = place / period - std::floor(place / period);
+    return std::min(count - 1, static_cast<int>(share * static_cast<float>(count)));
+  };
+  std::vector<std::vector<std::uint32_t>> members(static_cast<std::size_t>(nx * ny));
+  const auto place_of = [&](std::uint32_t s) {
+    return std::pair{column_of(midpoint[s].x(), exemplar.width_mm, nx),
+                     column_of(midpoint[s].y(), exemplar.height_mm, ny)};
+  };
+  for (std::uint32_t s = 0; s < segments; ++s) {
+    const auto [x, y] = place_of(s);
+    members[static_cast<std::size_t>(y * nx + x)].push_back(s);
+  }
+  // With fewer than three columns around a period, a step to either side would meet the same column twice.
+  const int reach_x = std::min(1, (nx - 1) / 2);
+  const int reach_y = std::min(1, (ny - 1) / 2);
+  const int first_x = nx == 2 ? 0 : -reach_x;
+  const int last_x = nx == 2 ? 1 : reach_x;
+  const int first_y = ny == 2 ? 0 : -reach_y;
+  const int last_y = ny == 2 ? 1 : reach_y;
+
+  std::vector<Vec3> mean(segments);
+  tbb::parallel_for(std::uint32_t{0}, segments, [&](std::uint32_t s) {
+    const float radius = kBundleRadii * exemplar.radius_mm[exemplar.segment_fiber[s]];
+    const auto [x, y] = place_of(s);
+    Vec3 sum = tangent[s];
+    for (int dy = first_y; dy <= last_y; ++dy) {
+      for (int dx = first_x; dx <= last_x; ++dx) {
+        for (const std::uint32_t other :
+             members[static_cast<std::size_t>((y + dy + ny) % ny * nx + (x + dx + nx) % nx)]) {
+          if (other == s) continue;
+          Vec3 apart = midpoint[other] - midpoint[s];
+          apart.x() -= exemplar.width_mm * std::round(apart.x() / exemplar.width_mm);
+          apart.y() -= exemplar.height_mm * std::round(apart.y() / exemplar.height_mm);
+          const float cosine = tangent[other].dot(tangent[s]);
+          if (apart.squaredNorm() > radius * radius || std::abs(cosine) < kLeastCosine) continue;
+          sum += cosine > 0 ? tangent[other] : Vec3(-tangent[other]);
+        }
+      }
+    }
+    mean[s] = sum.normalized();
+  });
+  return mean;
+}
+
+double bundle_spread(const Exemplar& exemplar, std::span<const Vec3> bundle_tangent) {
+  double sum = 0;
+  for (std::uint32_t s = 0; s < bundle_tangent.size(); ++s) {
+    const Vec3 tangent = exemplar.segment_tangent(s);
+    const double angle = std::atan2(tangent.cross(bundle_tangent[s]).norm(), tangent.dot(bundle_tangent[s]));
+    sum += angle * angle;
+  }
+  return std::sqrt(sum / static_cast<double>(std::max<std::size_t>(1, bundle_tangent.size())));
+}
+
+}  // namespace heddle

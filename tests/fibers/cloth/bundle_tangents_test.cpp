@@ -1,0 +1,89 @@
+#include "fibers/cloth/bundle_tangents.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "fibers/math/random.h"
+#include "fibers/math/sampling.h"
+#include "tests/support/fabrics.h"
+
+namespace heddle {
+namespace {
+
+constexpr float kRadius = 0.005F;
+
+/// Straight fibers on a grid of 8 x 5 at 0.012 mm, all along x.
+Exemplar straight_bundle() {
+  std::vector<Vec2> places;
+  for (int y = 0; y < 8; ++y) {
+    for (int z = 0; z < 5; ++z) {
+      places.emplace_back(0.012F * (static_cast<float>(y) + 0.5F), 0.012F * static_cast<float>(z));
+    }
+  }
+  return test::straight_fibers(0.4F, 0.096F, places, kRadius, 20, test::white_fiber());
+}
+
+TEST(BundleTangentsLaw, ParallelFibersAreTheirOwnBundle) {
+  const Exemplar exemplar = straight_bundle();
+  const std::vector<Vec3> mean = bundle_tangents(exemplar);
+  for (const Vec3& tangent : mean) EXPECT_LT((tangent - Vec3::UnitX()).norm(), 1e-6F);
+  EXPECT_LT(bundle_spread(exemplar, mean), 1e-6);
+}
+
+TEST(BundleTangentsLaw, WanderAveragesOut) {
+  Exemplar exemplar = straight_bundle();
+  RandomStream random(3, RandomStage::kTest, 1, 0);
+  for (Vec3& point : exemplar.points) point.tail<2>() += 0.002F * sample_disk(random);
+  index_segments(exemplar);
+  const std::vector<Vec3> mean = bundle_tangents(exemplar);
+  double own = 0;
+  double of_bundle = 0;
+  for (std::uint32_t s = 0; s < exemplar.segment_count(); ++s) {
+    own += (exemplar.segment_tangent(s) - Vec3::UnitX()).squaredNorm();
+    of_bundle += (mean[s] - Vec3::UnitX()).squaredNorm();
+  }
+  // Midpoints within 0.02 mm are those of 9 fibers (5 at the ends of the grid), one to three segments each: independent
+  // wander falls to a ninth (a fifth) in variance, and a little less where segments of one fiber, which share points, cancel.
+  EXPECT_LT(of_bundle, own / 4);
+  EXPECT_GT(of_bundle, own / 60);
+  EXPECT_NEAR(bundle_spread(exemplar, mean), std::sqrt(own / static_cast<double>(mean.size())), 0.2 * std::sqrt(own / static_cast<double>(mean.size())));
+}
+
+TEST(BundleTangentsLaw, DirectionAndPlaceOnThePeriodDoNotMatter) {
+  // Every other fiber runs backwards; their bundles are the same lines.
+  Exemplar turned = straight_bundle();
+  for (std::size_t f = 0; f + 1 < turned.first_point.size(); f += 2) {
+    std::reverse(turned.points.begin() + turned.first_point[f], turned.points.begin() + turned.first_point[f + 1]);
+  }
+  RandomStream random(3, RandomStage::kTest, 2, 0);
+  for (Vec3& point : turned.points) point.tail<2>() += 0.002F * sample_disk(random);
+  index_segments(turned);
+  Exemplar moved = turned;
+  for (Vec3& point : moved.points) point += Vec3(0.25F, 0.07F, 0);
+  index_segments(moved);
+  const std::vector<Vec3> mean = bundle_tangents(turned);
+  const std::vector<Vec3> mean_moved = bundle_tangents(moved);
+  for (std::uint32_t s = 0; s < turned.segment_count(); ++s) {
+    EXPECT_GT(mean[s].dot(turned.segment_tangent(s)), 0.9F);
+    EXPECT_LT((mean[s] - mean_moved[s]).norm(), 2e-3F) << s;
+  }
+}
+
+TEST(BundleTangents, FibersThatCrossDoNotCount) {
+  Exemplar exemplar = straight_bundle();
+  const std::vector<Vec3> alone = bundle_tangents(exemplar);
+  // A fiber across all others, just over them.
+  for (int k = 0; k <= 8; ++k) exemplar.points.emplace_back(0.2F, 0.096F * static_cast<float>(k) / 8, 0.058F);
+  exemplar.first_point.push_back(static_cast<std::uint32_t>(exemplar.points.size()));
+  exemplar.radius_mm.push_back(kRadius);
+  exemplar.material.push_back(0);
+  index_segments(exemplar);
+  const std::vector<Vec3> with = bundle_tangents(exemplar);
+  for (std::size_t s = 0; s < alone.size(); ++s) EXPECT_EQ(alone[s], with[s]);
+  EXPECT_LT((with.back() - Vec3::UnitY()).norm(), 1e-6F);
+}
+
+}  // namespace
+}  // namespace heddle
