@@ -137,7 +137,7 @@ class ChartMaker {
     WorkTime spent;
     PictureResult picture;
     for (int n = 0; n < (repeat ? kRepeats : 1) && (n == 0 || spent.seconds < kLongEnough); ++n) {
-      picture = job_->render(request, title);
+      picture = job_->render(request, title, true);  // a chart drives methods past their limits
       const WorkTime time = {picture.report.at("seconds").get<double>(),
                              picture.report.at("core_seconds").get<double>()};
       if (n == 0 || time.seconds < best.seconds) best = time;

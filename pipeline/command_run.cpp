@@ -7,6 +7,7 @@
 #include "pipeline/job.h"
 #include "pipeline/picture_compare.h"
 #include "pipeline/scene_job.h"
+#include "pipeline/warnings.h"
 
 namespace heddle {
 namespace {
@@ -28,6 +29,13 @@ void provide_picture(SceneJob& scene, const PictureRequest& request, const fs::p
     write_exr(cached, picture.image);
     result.built = true;
     result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  } else {
+    const std::vector<std::byte> bytes = read_whole_file(fs::path(cached).replace_extension(".json"));
+    const auto* text = reinterpret_cast<const char*>(bytes.data());
+    const auto report = nlohmann::ordered_json::parse(text, text + bytes.size());
+    if (report.contains("warnings")) {
+      for (const Warning& warning : warnings_of(report.at("warnings"))) context.console->warn(warning_text(warning));
+    }
   }
   for (const char* extension : {".exr", ".png", ".json"}) {
     write_file_atomically(fs::path(target).replace_extension(extension),

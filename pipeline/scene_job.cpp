@@ -10,6 +10,7 @@
 #include "pipeline/interrupt.h"
 #include "pipeline/scene_needs.h"
 #include "pipeline/version.h"
+#include "pipeline/warnings.h"
 #include "render/cloth_scene.h"
 #include "render/precomputed_renderer.h"
 #include "render/render_output.h"
@@ -81,6 +82,7 @@ struct SceneJob::Loaded {
   std::map<fs::path, FabricPack> packs;  // by fabric file
   std::map<fs::path, std::shared_ptr<const TileScene>> tiles;
   std::unique_ptr<ClothScene> scene;
+  std::vector<Warning> warnings;  // of the packs
 };
 
 SceneJob::SceneJob(const fs::path& scene_file, StageContext& context, const SceneVariant& variant)
@@ -185,13 +187,33 @@ const SceneJob::Loaded& SceneJob::loaded_for(RenderMethod method) {
     if (!cloth.surface) tiles.push_back(loaded->tiles.at(cloth.fabric));
   }
   loaded->scene.reset(new ClothScene(make_cloth_scene(config_, tiles)));  // cannot be moved: built in place
+  for (const auto& [file, pack] : loaded->packs) {
+    for (Warning& warning : pack_warnings(pack, *loaded->tiles.at(file)))
+      loaded->warnings.push_back(std::move(warning));
+  }
   return *loaded_.emplace(method, std::move(loaded)).first->second;
 }
 
-PictureResult SceneJob::render(const PictureRequest& request, const std::string& title) {
+PictureResult SceneJob::render(const PictureRequest& request, const std::string& title, bool quiet) {
   const std::string key = picture_key(request);
   const Loaded& loaded = loaded_for(request.method);
   const Camera camera(request.camera);
+
+  PictureSetup setup{loaded.scene.get(), {}, config_.lights, &camera, request.crop, request.method, variant_.blend};
+  std::vector<const FabricPack*> packs;
+  for (const ClothConfig& cloth : config_.cloths) {
+    if (!cloth.surface) packs.push_back(&loaded.packs.at(cloth.fabric));
+  }
+  setup.packs = packs;
+  std::vector<Warning> warnings = loaded.warnings;
+  const auto add_warnings = [&](std::vector<Warning>&& more) {
+    for (Warning& warning : more) warnings.push_back(std::move(warning));
+  };
+  add_warnings(picture_warnings(setup));
+  const auto say_from = [&](std::size_t first) {
+    for (std::size_t k = first; k < warnings.size() && !quiet; ++k) context_->console->warn(warning_text(warnings[k]));
+  };
+  say_from(0);
   const Stopwatch watch;
 
   // Progress in samples, or in seconds where those are the budget.
@@ -215,10 +237,6 @@ PictureResult SceneJob::render(const PictureRequest& request, const std::string&
                             path_tracer_settings(request));
     frame = trace_picture(tracer, camera, request.crop, request.seed, {request.spp, request.seconds}, report_progress);
   } else {
-    std::vector<const FabricPack*> packs;
-    for (const ClothConfig& cloth : config_.cloths) {
-      if (!cloth.surface) packs.push_back(&loaded.packs.at(cloth.fabric));
-    }
     const PrecomputedSettings settings{.seed = request.seed,
                                        .shading = shading_of(request.method),
                                        .volume = request.method == RenderMethod::kVolume,
@@ -228,6 +246,12 @@ PictureResult SceneJob::render(const PictureRequest& request, const std::string&
     environment_error = renderer.environment_error();
     frame = shade_picture(renderer, camera, request.crop, request.spp, report_progress);
   }
+
+  const WorkTime time = watch.elapsed();
+
+  const std::size_t said = warnings.size();
+  add_warnings(frame_warnings(setup, frame));
+  say_from(said);
 
   PictureResult result;
   const std::map<std::string, std::string> metadata = {
@@ -243,13 +267,13 @@ PictureResult SceneJob::render(const PictureRequest& request, const std::string&
   };
   result.image = image_of(frame, metadata);
   for (const auto& [name, value] : metadata) result.report[name] = value;
-  const WorkTime time = watch.elapsed();
   result.report["seconds"] = time.seconds;
   result.report["core_seconds"] = time.core_seconds;
   if (environment_error > 0) result.report["environment_fit_relative_error"] = environment_error;
   result.report["failed_shell_walks"] = loaded.scene->failed_walks();
   result.report["flipped_tetrahedra"] = loaded.scene->flipped_tets();
   result.report["degenerate_tetrahedra"] = loaded.scene->degenerate_tets();
+  result.report["warnings"] = warnings_report(warnings);
   return result;
 }
 

@@ -62,7 +62,8 @@ class SceneJob {
 
   /// Builds what the picture needs; equal keys, equal pictures.
   std::string picture_key(const PictureRequest& request);
-  PictureResult render(const PictureRequest& request, const std::string& title);
+  /// The report holds the warnings of docs/stability.md; they are said on the console too, unless `quiet`.
+  PictureResult render(const PictureRequest& request, const std::string& title, bool quiet = false);
   /// What the precomputed data of the picture took to build, all fabrics; they are built where missing.
   std::vector<StageCost> precompute_costs(const PictureRequest& request);
 
