@@ -153,8 +153,10 @@ bool takes_visibility_forms(RenderMethod method) {
 }
 
 void add_light_warnings(const PictureSetup& setup, std::vector<Warning>& warnings) {
-  bool any_sphere = false;
-  for (const FabricPack* pack : setup.packs) any_sphere = any_sphere || (pack->sgs && pack->light_from_both_sides);
+  const SgVisibility* sphere = nullptr;  // of the first fabric with light from both sides
+  for (const FabricPack* pack : setup.packs) {
+    if (sphere == nullptr && pack->sgs && pack->light_from_both_sides) sphere = &*pack->sgs;
+  }
   for (std::size_t l = 0; l < setup.lights.size(); ++l) {
     const Light& light = setup.lights[l];
     if (light.type != LightType::kSphericalGaussian || !takes_visibility_forms(setup.method)) continue;
@@ -167,12 +169,12 @@ void add_light_warnings(const PictureSetup& setup, std::vector<Warning>& warning
            fmt::format("{}, and sums of Gaussians, which leak light from sharpness {:g} on, serve it alone", name,
                        kLobesSharpness),
            0.3, "Let signed distances serve it (visibility blend 100 to 200)"});
-    } else if (lobes && any_sphere && sharpness > kSphereLobesSharpness) {
+    } else if (lobes && sphere != nullptr && sharpness > kSphereLobesSharpness) {
       warnings.push_back(
           {"sum-of-gaussians",
            fmt::format("{}; {} Gaussians over the whole sphere (light_from = \"both\") are coarse from {:g} on", name,
-                       setup.packs[0]->sgs ? setup.packs[0]->sgs->lobes() : 0, kSphereLobesSharpness),
-           0.35, "More Gaussians (sg_count = 96), light_from = \"face\", or --method path"});
+                       sphere->lobes(), kSphereLobesSharpness),
+           0.3, "More Gaussians (sg_count = 96), light_from = \"face\", or --method path"});
     }
     if (setup.blend.uses_distance(light.sharpness) && sharpness < kDistanceSharpness) {
       warnings.push_back({"signed-distance",

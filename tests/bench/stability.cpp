@@ -107,8 +107,9 @@ void draw(std::ostream& out, const Measured& measured, double left, double top) 
                      xml_text(curve.measure));
   if (curve.warning_from) {
     const double at = axes.x(*curve.warning_from);
+    const double to = curve.warning_to ? axes.x(*curve.warning_to) : right;
     out << fmt::format("<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" fill=\"#fff0c8\"/>\n",
-                       curve.warns_above ? at : axes.left, upper, curve.warns_above ? right - at : at - axes.left,
+                       curve.warns_above ? at : axes.left, upper, curve.warns_above ? to - at : at - axes.left,
                        axes.height);
     out << fmt::format(
         "<line x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"{1:.1f}\" y2=\"{2:.1f}\" stroke=\"#b07000\" "

@@ -16,8 +16,8 @@ Curve shell_curve(Effort) {
               .is_log = false,
               .drivers = {0.1, 0.3, 0.5, 0.7, 0.9, 1.0, 1.1, 1.3, 1.6, 2, 3},
               .series = {{"flipped", {}}, {"share of the folds that curves too tightly", {}}},
-              .warning_from = {}};
-  constexpr double kHalf = 0.1;  // mm
+              .warning_from = 1.0};  // kHiddenTetShare is passed with the first folds that are too tight
+  constexpr double kHalf = 0.1;      // mm
   for (const double ratio : curve.drivers) {
     const FoldedMesh fold(kHalf / ratio);
     const Shell shell(fold.mesh(), -kHalf, kHalf);

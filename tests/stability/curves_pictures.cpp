@@ -337,9 +337,7 @@ Curve distance_curve(Effort effort) {
               .is_log = true,
               .drivers = effort == Effort::kFull ? std::vector<double>{0.01, 0.03, 0.1, 0.3, 1, 3, 10, 30}
                                                  : std::vector<double>{0.03, 3},
-              .series = {{"measured between pixels, 16 samples", {}},
-                         {"as reported, 16 samples", {}},
-                         {"as reported, 64 samples", {}}},
+              .series = {{"between pixels, 16 spp", {}}, {"reported, 16 spp", {}}, {"reported, 64 spp", {}}},
               .warning_from = 1.0};
   const SmallFabric fabric;
   SmallPipeline pipeline(fabric);

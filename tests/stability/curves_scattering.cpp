@@ -46,7 +46,7 @@ double brute_force_gamma(const FiberScattering& fiber, const SphericalGaussian& 
 }  // namespace
 
 Curve gamma_curve(Effort effort) {
-  Curve curve{.title = "Gamma under soft light at grazing views (R, beta 10 deg, theta_o 75 to 85 deg)",
+  Curve curve{.title = "Gamma at grazing views (R 10 deg, theta_o 75 to 85 deg)",
               .driver = "sharpness of the light",
               .measure = "mean |error| / mean value",
               .is_log = true,

@@ -169,10 +169,10 @@ TEST(DistanceStability, NoiseIsWhatTheSamplesSay) {
   const Curve curve = measured(distance_curve);
   const std::size_t far = curve.drivers.size() - 1;
   ASSERT_TRUE(warned(curve, curve.drivers[far]));
-  const double reported = curve.of("as reported, 16 samples")[far];
+  const double reported = curve.of("reported, 16 spp")[far];
   // 575 pairs of pixels, heavy tails: the deviation is good to some 10 %. More would be structure, which is aliasing.
-  EXPECT_NEAR(curve.of("measured between pixels, 16 samples")[far] / reported, 1, 0.2);
-  EXPECT_NEAR(curve.of("as reported, 64 samples")[far] / reported, 0.5, 0.05);
+  EXPECT_NEAR(curve.of("between pixels, 16 spp")[far] / reported, 1, 0.2);
+  EXPECT_NEAR(curve.of("reported, 64 spp")[far] / reported, 0.5, 0.05);
   EXPECT_LT(reported, 0.5);
 }
 

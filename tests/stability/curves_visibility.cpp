@@ -48,7 +48,10 @@ Curve visibility_errors(Effort effort, bool both_sides) {
                      : std::vector<double>{3, 50, 100, 200, 1000},
       .series = {{"sum of Gaussians", {}}, {"signed distance", {}}, {"blended (shipped)", {}}, {"blended, mean", {}}},
       .warning_from = {}};
-  if (both_sides) curve.warning_from = kSphereLobesSharpness;
+  if (both_sides) {
+    curve.warning_from = kSphereLobesSharpness;
+    curve.warning_to = VisibilityBlend{}.to;
+  }
   const TileScene tile(synthesize(test::small_fabric()));
   const Exemplar& exemplar = tile.exemplar();
   const SegmentOrigins origins = find_segment_origins(tile, both_sides, OriginChoice::kExposed, 1);

@@ -26,8 +26,9 @@ struct Curve {
   bool is_log = false;  // the driver's axis
   std::vector<double> drivers;
   std::vector<Series> series;
-  std::optional<double> warning_from;  // the program's own limit, in units of the driver; empty: it does not warn
-  bool warns_above = true;             // beyond the limit; else below it
+  std::optional<double> warning_from;     // the program's own limit, in units of the driver; empty: it does not warn
+  bool warns_above = true;                // beyond the limit; else below it
+  std::optional<double> warning_to = {};  // where another form takes over
 
   /// Values of a series; the names are in its curve's function.
   const std::vector<double>& of(const std::string& name) const;
