@@ -37,7 +37,7 @@ void apply_overrides(const RenderOptions& options, PictureRequest& request) {
 int render_command(const RenderOptions& options, const CommonOptions& common) {
   if (options.output.extension() != ".exr") throw ConfigError("-o: expected a file name that ends in .exr");
   Job job(common);
-  SceneJob scene(options.scene, job.context(), {.order = options.order, .fabric = {}, .blend = {}});
+  SceneJob scene(options.scene, job.context(), {.order = options.order, .fabric = {}, .blend = {}, .surface_method = {}});
   PictureRequest request = scene.request(find_view(scene.config(), options.view));
   apply_overrides(options, request);
   const PictureResult picture = scene.render(request, "render");

@@ -70,7 +70,7 @@ Image cropped(const Image& full, const PixelRect& crop) {
 
 int run_command(const RunOptions& options, const CommonOptions& common) {
   Job job(common);
-  SceneJob scene(options.scene, job.context(), {.order = options.order, .fabric = {}, .blend = {}});
+  SceneJob scene(options.scene, job.context(), {.order = options.order, .fabric = {}, .blend = {}, .surface_method = {}});
   const fs::path folder = options.output.empty() ? fs::path("out") / options.scene.stem() : options.output;
   make_folder(folder);
 

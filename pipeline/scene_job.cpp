@@ -83,6 +83,7 @@ struct SceneJob::Loaded {
   std::map<fs::path, std::shared_ptr<const TileScene>> tiles;
   std::unique_ptr<ClothScene> scene;
   std::vector<Warning> warnings;  // of the packs
+  std::vector<std::shared_ptr<const InteractiveSurface>> interactive;  // [surface cloth]
 };
 
 SceneJob::SceneJob(const fs::path& scene_file, StageContext& context, const SceneVariant& variant)
@@ -91,7 +92,13 @@ SceneJob::SceneJob(const fs::path& scene_file, StageContext& context, const Scen
   config_ = read_scene_config(document);
   auto text = nlohmann::json::parse(document.canonical_text());
   for (const char* key : {"name", "camera", "view", "render"}) text.erase(key);
+  for (auto& cloth : text.at("cloth")) cloth.erase("surface_method");  // part of the key on its own
   scene_text_ = text.dump();
+  for (ClothConfig& cloth : config_.cloths) {
+    if (variant.surface_method && cloth.surface && cloth.surface->interactive) {
+      cloth.surface_method = *variant.surface_method;
+    }
+  }
   for (const ClothConfig& cloth : config_.cloths) {
     if (cloth.surface) continue;
     auto& stages = fabrics_[cloth.fabric];
@@ -132,6 +139,10 @@ std::vector<StageCost> SceneJob::precompute_costs(const PictureRequest& request)
   for (auto& [file, stages] : request.method == RenderMethod::kPrinted ? printed_fabrics() : fabrics_) {
     for (StageCost& cost : stages->costs(needs_for(request.method))) all.push_back(std::move(cost));
   }
+  if (!traces_paths(request.method)) {
+    loaded_for(request.method);  // the scene, without which its surfaces' data cannot be built
+    for (StageCost& cost : surface_stages().costs()) all.push_back(std::move(cost));
+  }
   return all;
 }
 
@@ -168,9 +179,18 @@ std::string SceneJob::picture_key(const PictureRequest& request) {
     if (cloth.mesh) values.emplace_back("mesh", content_hash_of_file(cloth.mesh->path));
     if (cloth.surface) values.emplace_back("surface", cloth.surface->text);
   }
+  for (const std::string& surface : surface_stages().keys()) values.emplace_back("interactive", surface);
   for (const fs::path& map : config_.environment_files) values.emplace_back("environment", content_hash_of_file(map));
   for (const MeshFile& mesh : config_.meshes) values.emplace_back("mesh", content_hash_of_file(mesh.path));
   return stage_key(inputs);
+}
+
+const SurfaceStages& SceneJob::surface_stages() {
+  if (!surface_stages_) {
+    surface_stages_.emplace(config_, *context_,
+                            [this](const fs::path& fabric) { return fabrics_.at(fabric)->geometry_key(); });
+  }
+  return *surface_stages_;
 }
 
 const SceneJob::Loaded& SceneJob::loaded_for(RenderMethod method) {
@@ -191,6 +211,7 @@ const SceneJob::Loaded& SceneJob::loaded_for(RenderMethod method) {
     for (Warning& warning : pack_warnings(pack, *loaded->tiles.at(file)))
       loaded->warnings.push_back(std::move(warning));
   }
+  if (!traces_paths(method)) loaded->interactive = surface_stages().load(*loaded->scene);
   return *loaded_.emplace(method, std::move(loaded)).first->second;
 }
 
@@ -241,7 +262,8 @@ PictureResult SceneJob::render(const PictureRequest& request, const std::string&
                                        .shading = shading_of(request.method),
                                        .volume = request.method == RenderMethod::kVolume,
                                        .shadow_sigma_mm = config_.shadow_sigma_mm,
-                                       .blend = variant_.blend};
+                                       .blend = variant_.blend,
+                                       .interactive = loaded.interactive};
     const PrecomputedRenderer renderer(*loaded.scene, packs, config_.lights, config_.background, settings);
     environment_error = renderer.environment_error();
     frame = shade_picture(renderer, camera, request.crop, request.spp, report_progress);

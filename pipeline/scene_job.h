@@ -14,6 +14,7 @@
 #include "fibers/baked/fabric_pack.h"
 #include "formats/image_file.h"
 #include "pipeline/stages.h"
+#include "pipeline/surface_stages.h"
 #include "render/path_tracer.h"
 #include "render/scene_config.h"
 #include "render/single_scattering.h"
@@ -25,6 +26,7 @@ struct SceneVariant {
   std::optional<int> order;  // of the transfer; the fabric's where empty
   FabricVariant fabric;
   VisibilityBlend blend;
+  std::optional<SurfaceMethod> surface_method;  // of all cloths that have a choice; the scene's where empty
   auto operator<=>(const SceneVariant&) const = default;
 };
 
@@ -74,12 +76,14 @@ class SceneJob {
   Fabrics& printed_fabrics();
   std::vector<Artifact> packs_for(RenderMethod method);
   const Loaded& loaded_for(RenderMethod method);
+  const SurfaceStages& surface_stages();
 
   SceneConfig config_;
   std::string scene_text_;  // canonical text of what all pictures of the scene depend on
   StageContext* context_;
   SceneVariant variant_;
   Fabrics fabrics_;
+  std::optional<SurfaceStages> surface_stages_;
   Fabrics printed_fabrics_;  // the same, baked as printed; empty until a picture needs them
   std::map<RenderMethod, std::unique_ptr<Loaded>> loaded_;
 };

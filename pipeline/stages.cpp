@@ -88,6 +88,10 @@ StageCost read_cost(const fs::path& file) {
   return cost;
 }
 
+fs::path cost_file(const Stage& stage, const Cache& cache) {
+  return cache.artifact(stage.name, stage.key, ".cost.json");
+}
+
 fs::path chunk_cost_file(fs::path chunk) { return chunk.replace_extension(".cost.json"); }
 
 std::string hash_of_geometry(const Exemplar& exemplar) {
@@ -157,14 +161,6 @@ FabricDocument read_fabric_document(const fs::path& path, std::optional<std::uin
   return fabric;
 }
 
-/// One stage of one fabric: where its artifact lies, and what the artifact says of its origin.
-struct FabricStages::Stage {
-  std::string name;
-  std::string extension;
-  std::string key;
-  std::map<std::string, std::string> metadata;
-};
-
 FabricStages::FabricStages(const fs::path& fabric_file, StageContext& context, const FabricVariant& variant,
                            BakeChoices choices)
     : document_(read_fabric_document(fabric_file, context.seed, variant)), context_(&context) {
@@ -180,9 +176,8 @@ FabricStages::FabricStages(const fs::path& fabric_file, StageContext& context, c
 
 FabricStages::~FabricStages() = default;
 
-FabricStages::Stage FabricStages::make_stage(std::string name, int version, std::string extension,
-                                             const std::string& config,
-                                             std::vector<std::pair<std::string, std::string>> upstream) const {
+Stage make_stage(std::string name, int version, std::string extension, const std::string& config,
+                 std::vector<std::pair<std::string, std::string>> upstream) {
   upstream.emplace_back("config", config);
   Stage stage;
   stage.key = stage_key({name, version, std::move(upstream)});
@@ -202,39 +197,42 @@ void StageContext::report(StageResult result) {
   results.push_back(std::move(result));
 }
 
-/// build(path, result) writes the artifact, atomically, where the cache lacks it.
-template <class Build>
-Artifact FabricStages::artifact_of(const Stage& stage, Build&& build) {
-  const Artifact artifact{stage.key, context_->cache.artifact(stage.name, stage.key, stage.extension)};
-  StageResult result{.fabric = document_.config.name, .stage = stage.name, .key = stage.key, .artifact = artifact.path};
+Artifact provide_artifact(const Stage& stage, const std::string& fabric, StageContext& context,
+                          const std::function<void(const fs::path&, StageResult&)>& build) {
+  const Artifact artifact{stage.key, context.cache.artifact(stage.name, stage.key, stage.extension)};
+  StageResult result{.fabric = fabric, .stage = stage.name, .key = stage.key, .artifact = artifact.path};
   if (!fs::exists(artifact.path)) {
     stop_if_interrupted();
-    const WorkTime outer = std::exchange(context_->nested, {});
+    const WorkTime outer = std::exchange(context.nested, {});
     const Stopwatch watch;
-    context_->cache.prepare(stage.name, stage.key, stage.extension);
+    context.cache.prepare(stage.name, stage.key, stage.extension);
     build(artifact.path, result);
     result.built = true;
     const WorkTime whole = watch.elapsed();
-    const WorkTime own = whole - context_->nested;
-    context_->nested = outer + whole;
+    const WorkTime own = whole - context.nested;
+    context.nested = outer + whole;
     result.seconds = own.seconds;
-    write_cost(cost_file(stage), own + result.earlier);
+    write_cost(cost_file(stage, context.cache), own + result.earlier);
   }
-  context_->report(std::move(result));
+  context.report(std::move(result));
   return artifact;
 }
 
-fs::path FabricStages::cost_file(const Stage& stage) const {
-  return context_->cache.artifact(stage.name, stage.key, ".cost.json");
+StageCost recorded_cost(const Stage& stage, const Cache& cache) {
+  StageCost cost = read_cost(cost_file(stage, cache));
+  cost.stage = stage.name;
+  cost.key = stage.key;
+  return cost;
+}
+
+Artifact FabricStages::artifact_of(const Stage& stage,
+                                   const std::function<void(const fs::path&, StageResult&)>& build) {
+  return provide_artifact(stage, document_.config.name, *context_, build);
 }
 
 std::vector<StageCost> FabricStages::costs(const Needs& needs) {
   std::vector<StageCost> costs;
-  const auto add = [&](const Stage& stage) {
-    costs.push_back(read_cost(cost_file(stage)));
-    costs.back().stage = stage.name;
-    costs.back().key = stage.key;
-  };
+  const auto add = [&](const Stage& stage) { costs.push_back(recorded_cost(stage, context_->cache)); };
   add(synth_stage());
   if (needs.ssdf || needs.sgs) add(maps_stage());
   if (needs.ssdf) add(ssdf_stage());
@@ -267,7 +265,7 @@ const std::string& FabricStages::geometry_key() {
   return geometry_key_;
 }
 
-FabricStages::Stage FabricStages::synth_stage() const {
+Stage FabricStages::synth_stage() const {
   return make_stage("synth", 1, ".safetensors", document_.cloth_text, {});
 }
 
@@ -350,7 +348,7 @@ void FabricStages::run_shard(const Stage& stage, Work&& work) {
 }
 
 // Maps do not depend on [visibility], which says how they are compressed.
-FabricStages::Stage FabricStages::maps_stage() {
+Stage FabricStages::maps_stage() {
   std::vector<std::pair<std::string, std::string>> upstream = {{"geometry", geometry_key()},
                                                                {"light_from", light_from()},
                                                                {"seed", fmt::format("{}", document_.config.seed)}};
@@ -397,13 +395,13 @@ void FabricStages::visibility_shard(Shard shard) {
   });
 }
 
-FabricStages::Stage FabricStages::fit_stage(const std::string& name, int version) {
+Stage FabricStages::fit_stage(const std::string& name, int version) {
   return make_stage(name, version, ".safetensors", document_.visibility_text,
                     {{"maps", maps_stage().key}, {"seed", fmt::format("{}", document_.config.seed)}});
 }
 
-FabricStages::Stage FabricStages::ssdf_stage() { return fit_stage("ssdf", 1); }
-FabricStages::Stage FabricStages::sg_stage() { return fit_stage("sg", 1); }
+Stage FabricStages::ssdf_stage() { return fit_stage("ssdf", 1); }
+Stage FabricStages::sg_stage() { return fit_stage("sg", 1); }
 
 Artifact FabricStages::ssdf() {
   const Stage stage = ssdf_stage();
@@ -433,7 +431,7 @@ TransferSettings FabricStages::transfer_settings(std::optional<int> order) const
   return settings;
 }
 
-FabricStages::Stage FabricStages::transfer_stage(const TransferSettings& settings) {
+Stage FabricStages::transfer_stage(const TransferSettings& settings) {
   std::vector<std::pair<std::string, std::string>> upstream = {{"fibers", synth().key},
                                                                {"order", fmt::format("{}", settings.order)},
                                                                {"light_from", light_from()},
@@ -485,7 +483,7 @@ Artifact FabricStages::transfer(std::optional<int> order) {
   });
 }
 
-FabricStages::Stage FabricStages::volume_stage() {
+Stage FabricStages::volume_stage() {
   return make_stage("voxelize", 1, ".vdb", document_.volume_text, {{"geometry", geometry_key()}});
 }
 

@@ -20,6 +20,8 @@
 #include <compare>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -122,6 +124,23 @@ struct Artifact {
   std::filesystem::path path;
 };
 
+/// One stage: where its artifact lies, and what the artifact says of its origin.
+struct Stage {
+  std::string name;
+  std::string extension;
+  std::string key;
+  std::map<std::string, std::string> metadata;
+};
+Stage make_stage(std::string name, int version, std::string extension, const std::string& config,
+                 std::vector<std::pair<std::string, std::string>> upstream);
+
+/// The stage's artifact; where the cache lacks it, build(path, result) writes it, atomically. `fabric`: for the report.
+Artifact provide_artifact(const Stage& stage, const std::string& fabric, StageContext& context,
+                          const std::function<void(const std::filesystem::path&, StageResult&)>& build);
+
+/// What the artifact took to build, by whatever process; seconds < 0 where there is no record of it.
+StageCost recorded_cost(const Stage& stage, const Cache& cache);
+
 /// Rays from which the mean free path of a fabric is estimated: good to about 1 %.
 inline constexpr int kMeanFreePathSamples = 20000;
 
@@ -134,6 +153,8 @@ class FabricStages {
   ~FabricStages();
 
   const FabricDocument& document() const { return document_; }
+  /// Hash of the fibers' shapes, which are built where missing.
+  const std::string& geometry_key();
 
   /// Each builds its artifact, and what that needs, where the cache lacks it.
   Artifact synth();
@@ -152,13 +173,9 @@ class FabricStages {
   void transfer_shard(std::optional<int> order, Shard shard);
 
  private:
-  struct Stage;
   struct TransferWork;
-  std::filesystem::path cost_file(const Stage& stage) const;
-  Stage make_stage(std::string name, int version, std::string extension, const std::string& config,
-                   std::vector<std::pair<std::string, std::string>> upstream) const;
-  template <class Build>
-  Artifact artifact_of(const Stage& stage, Build&& build);
+  Artifact artifact_of(const Stage& stage,
+                       const std::function<void(const std::filesystem::path&, StageResult&)>& build);
   template <class Work>
   void run_shard(const Stage& stage, Work&& work);
   /// compute(file, first, end) for those of the shard's chunks that are not on disk.
@@ -171,7 +188,6 @@ class FabricStages {
   const Exemplar& exemplar();
   const TileScene& scene();
   const SegmentOrigins& origins();
-  const std::string& geometry_key();
   const char* light_from() const;
   /// What a key holds besides where the origins are not the default's.
   void append_origins(std::vector<std::pair<std::string, std::string>>& upstream) const;

@@ -34,6 +34,11 @@ TriangleMesh scaled_mesh(const ObjMesh& obj, double mm_per_unit) {
   return mesh;
 }
 
+/// Rectangles along each side of a flat cloth; its vertices may have to know what they see.
+std::uint32_t flat_cells(const ClothConfig& cloth) {
+  return cloth.surface_method == SurfaceMethod::kInteractive ? 48 : 1;
+}
+
 }  // namespace
 
 std::vector<TriangleMesh> ClothScene::boundaries(const std::vector<Cloth>& cloths) {
@@ -75,7 +80,7 @@ std::optional<MeshHit> ClothScene::first_mesh(const Vec3d& origin, const Vec3& d
       meshes_.intersect(origin.cast<float>(), direction, static_cast<float>(t_max));
   if (!hit) return {};
   const SurfaceCloth* surface = hit->mesh < surfaces_.size() ? &surfaces_[hit->mesh] : nullptr;
-  return MeshHit{static_cast<double>(hit->t), surface, hit->triangle, hit->u, hit->v};
+  return MeshHit{static_cast<double>(hit->t), surface, hit->mesh, hit->triangle, hit->u, hit->v};
 }
 
 bool ClothScene::occluded(const SceneRay& ray) const {
@@ -137,7 +142,7 @@ ClothScene make_cloth_scene(const SceneConfig& config,
   for (const ClothConfig& cloth : config.cloths) {
     ClothMesh mesh = cloth.mesh ? cloth_mesh_of(read_obj(cloth.mesh->path), cloth.mesh->path.string(),
                                                 cloth.mesh->mm_per_unit, cloth.uv_size_mm)
-                                : flat_cloth(cloth.flat_width_mm, cloth.flat_height_mm);
+                                : flat_cloth(cloth.flat_width_mm, cloth.flat_height_mm, flat_cells(cloth));
     if (cloth.surface) {
       surfaces.emplace_back(cloth.surface->model, std::move(mesh));
     } else {

@@ -47,6 +47,7 @@ struct ShellHit {
 struct MeshHit {
   double t;                     // mm along the ray
   const SurfaceCloth* surface;  // null: a black mesh
+  std::uint32_t mesh;           // with a surface, its index
   std::uint32_t triangle;
   float u, v;  // as in TriangleScene::Hit
 };
@@ -71,6 +72,7 @@ class ClothScene {
   ClothScene(std::vector<ClothPiece> pieces, std::vector<TriangleMesh> black_meshes,
              std::vector<SurfaceCloth> surfaces = {});
 
+  std::span<const SurfaceCloth> surfaces() const { return surfaces_; }
   /// Pieces of fibers; all that `cloth` counts below.
   std::size_t cloth_count() const { return cloths_.size(); }
   const Shell& shell(std::uint32_t cloth) const { return cloths_[cloth].shell; }

@@ -149,7 +149,11 @@ PrecomputedRenderer::GlobalVisibility PrecomputedRenderer::global_visibility(con
   return result;
 }
 
-Rgb PrecomputedRenderer::surface_light(const SurfaceHit& hit, const Vec3& wo, RandomStream& random) const {
+Rgb PrecomputedRenderer::surface_light(const SurfaceHit& hit, std::uint32_t surface, const Vec3& wo,
+                                       RandomStream& random) const {
+  if (surface < settings_.interactive.size() && settings_.interactive[surface]) {
+    return settings_.interactive[surface]->light(hit, wo, lights_);
+  }
   return surface_direct_light(hit, wo, scene_lights_, LightEstimator::kCombined, random, [&](const Vec3& direction) {
     return scene_->globally_visible({hit.position, hit.normal}, direction);
   });
@@ -201,7 +205,7 @@ void PrecomputedRenderer::shade(const Camera& camera, const PixelRect& block, in
       const SurfaceHit surface =
           mesh->surface->hit(mesh->triangle, mesh->u, mesh->v, ray.direction, ray.spread * mesh->t);
       RandomStream random(settings_.seed, RandomStage::kLightVisibility, address(pixel), static_cast<std::uint64_t>(s));
-      samples[i].single = surface_light(surface, -ray.direction, random);
+      samples[i].single = surface_light(surface, mesh->mesh, -ray.direction, random);
       const Vec2& place = surface.point.position_mm;
       if (s == 0) {
         seen[pixel] = Seen{Seen::kNone, Seen::kNone, surface.position, Vec3d(place.x(), place.y(), 0),

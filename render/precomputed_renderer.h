@@ -11,7 +11,8 @@
 //      only, from that part of the light that lies on the face's side, since the precomputed data hold no other light;
 //   3. shading, sorted by cell and tetrahedron: single_scattering.h, multiple_scattering.h, or a rival of theirs. Incoming fields of all lights
 //      are summed before they are turned and scattered, and are kept while cell and light direction stay the same.
-// Surface cloths are lit directly, at once, with shadows of the same shells and meshes (surface_cloth.h).
+// Surface cloths are lit directly, at once, with shadows of the same shells and meshes: by one sample (surface_cloth.h), or
+// from data of their own without noise (interactive_surface.h).
 // What is not modelled: light between different parts of the cloth, and the shell's bend between two fibers of one cell.
 // Signs of multiple scattering are kept (see multiple_scattering.h): a dark pixel can be slightly negative.
 // Eye rays are those of the path tracer with the same seed. Random numbers are addressed by pixel of the full frame and
@@ -28,6 +29,7 @@
 #include "fibers/baked/id_bricks.h"
 #include "render/camera.h"
 #include "render/cloth_scene.h"
+#include "render/interactive_surface.h"
 #include "render/lights.h"
 #include "render/multiple_scattering.h"
 #include "render/path_tracer.h"
@@ -55,6 +57,8 @@ struct PrecomputedSettings {
   // Deviation of the Gaussian; the thickness of the cloth where absent.
   std::optional<double> shadow_sigma_mm;
   VisibilityBlend blend;
+  // [surface cloth] null, or missing at the end: sampled.
+  std::vector<std::shared_ptr<const InteractiveSurface>> interactive;
 };
 
 class PrecomputedRenderer {
@@ -104,13 +108,13 @@ class PrecomputedRenderer {
                                        RandomStream& random) const;
 
   std::optional<ShellHit> eye_hit(const SceneRay& ray) const;
-  Rgb surface_light(const SurfaceHit& hit, const Vec3& wo, RandomStream& random) const;
+  Rgb surface_light(const SurfaceHit& hit, std::uint32_t surface, const Vec3& wo, RandomStream& random) const;
   GlobalVisibility global_visibility(const ShellHit& hit, const Light& light, RandomStream& random) const;
 
   const ClothScene* scene_;
-  std::span<const Light> scene_lights_;  // what surface cloth is lit by
+  std::span<const Light> scene_lights_;  // what sampled surface cloth is lit by
   FittedLights fitted_;
-  std::span<const Light> lights_;  // what fibers are lit by: environments as Gaussians
+  std::span<const Light> lights_;  // what all else is lit by: environments as Gaussians
   std::vector<MultipleScattering::LightShape> shapes_;  // [light]
   Rgb background_;
   PrecomputedSettings settings_;

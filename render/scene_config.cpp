@@ -153,7 +153,22 @@ SurfaceFabric read_surface(const TomlTable& table) {
     }
     return surface_preset(name);
   }();
-  return {name, document.canonical_text(), read_surface_model(document)};
+  SurfaceFabric fabric{name, document.canonical_text(), read_surface_model(document), {}};
+  if (document.string("model") == "microcylinder") {
+    const MicrocylinderFabric threads = read_microcylinder_fabric(document);
+    if (!threads.energy_safe) fabric.interactive = threads;
+  }
+  return fabric;
+}
+
+SurfaceMethod read_surface_method(const TomlTable& table, const SurfaceFabric& fabric) {
+  if (table.choice("surface_method", {"sampled", "interactive"}, "sampled") == "sampled") return SurfaceMethod::kSampled;
+  if (!fabric.interactive) {
+    table.fail("surface_method",
+               fmt::format("{} has no interactive form; fabrics of the model microcylinder without energy_safe have: {}",
+                           fabric.name, fmt::join(surface_preset_names("microcylinder"), ", ")));
+  }
+  return SurfaceMethod::kInteractive;
 }
 
 ClothConfig read_cloth(const TomlTable& table) {
@@ -170,6 +185,7 @@ ClothConfig read_cloth(const TomlTable& table) {
   if (table.has("fabric") == table.has("surface")) table.fail("fabric", "expected either fabric or surface");
   if (table.has("surface")) {
     cloth.surface = read_surface(table);
+    cloth.surface_method = read_surface_method(table, *cloth.surface);
   } else {
     cloth.fabric = table.existing_file("fabric");
     cloth.underlay = table.boolean("underlay", false);

@@ -17,6 +17,7 @@
 #include "formats/toml_table.h"
 #include "render/camera.h"
 #include "render/lights.h"
+#include "render/surface/microcylinder.h"
 #include "render/surface/surface_model.h"
 
 namespace heddle {
@@ -53,6 +54,12 @@ constexpr bool traces_paths(RenderMethod method) {
   return method == RenderMethod::kPath || method == RenderMethod::kPath6;
 }
 
+/// How the precomputed methods shade a cloth without fibers. Traced paths always sample.
+enum class SurfaceMethod : std::uint8_t {
+  kSampled,      // shadow rays and directions drawn from the model
+  kInteractive,  // closed forms from precomputed data (surface/interactive_microcylinder.h)
+};
+
 struct MeshFile {
   std::filesystem::path path;
   double mm_per_unit = 1;
@@ -63,6 +70,7 @@ struct SurfaceFabric {
   std::string name;  // as the scene gives it: a preset or a file
   std::string text;  // canonical text of its config: equal content, equal text
   std::shared_ptr<const SurfaceModel> model;
+  std::optional<MicrocylinderFabric> interactive;  // where the model has an interactive form
 };
 
 struct ClothConfig {
@@ -72,6 +80,7 @@ struct ClothConfig {
   double flat_height_mm = 0;
   std::filesystem::path fabric;  // fabric TOML; empty where a surface model draws the cloth
   std::optional<SurfaceFabric> surface;
+  SurfaceMethod surface_method = SurfaceMethod::kSampled;
   bool underlay = false;  // a black copy of the cloth's underside just below it; fibers only
 };
 

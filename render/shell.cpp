@@ -70,16 +70,22 @@ ClothMesh cloth_mesh_of(const ObjMesh& obj, const std::string& name, double mm_p
   return mesh;
 }
 
-ClothMesh flat_cloth(double width_mm, double height_mm) {
+ClothMesh flat_cloth(double width_mm, double height_mm, std::uint32_t cells) {
   ClothMesh mesh;
-  for (const double y : {-0.5 * height_mm, 0.5 * height_mm}) {
-    for (const double x : {-0.5 * width_mm, 0.5 * width_mm}) {
+  for (std::uint32_t row = 0; row <= cells; ++row) {
+    for (std::uint32_t column = 0; column <= cells; ++column) {
+      const double x = (static_cast<double>(column) / cells - 0.5) * width_mm;
+      const double y = (static_cast<double>(row) / cells - 0.5) * height_mm;
       mesh.positions.emplace_back(x, y, 0);
       mesh.normals.emplace_back(0, 0, 1);
       mesh.fabric.emplace_back(x, y);
+      if (row == cells || column == cells) continue;
+      const std::uint32_t below = row * (cells + 1) + column;
+      const std::uint32_t above = below + cells + 1;
+      mesh.triangles.push_back({below, below + 1, above + 1});
+      mesh.triangles.push_back({below, above + 1, above});
     }
   }
-  mesh.triangles = {{0, 1, 3}, {0, 3, 2}};
   return mesh;
 }
 

@@ -40,8 +40,8 @@ struct ClothMesh {
 /// none. Errors: FileError naming `name` (no UVs, no triangles).
 ClothMesh cloth_mesh_of(const ObjMesh& obj, const std::string& name, double mm_per_unit, double uv_size_mm);
 
-/// A flat swatch centred on the origin in which fabric space is world space.
-ClothMesh flat_cloth(double width_mm, double height_mm);
+/// A flat swatch centred on the origin in which fabric space is world space, of cells * cells rectangles.
+ClothMesh flat_cloth(double width_mm, double height_mm, std::uint32_t cells = 1);
 
 /// One straight piece of a ray inside one tetrahedron.
 struct ShellInterval {

@@ -19,6 +19,15 @@ Vec3d across(const Vec3d& direction, const Vec3d& z) {
   return frame_about(z.cast<float>()).col(1).cast<double>();
 }
 
+/// Columns x, y, z of the patch frame.
+Mat3d patch_frame(const Vec3d& tangent, const Vec3d& z) {
+  Mat3d frame;
+  frame.col(0) = across(tangent, z);
+  frame.col(1) = z.cross(Vec3d(frame.col(0)));
+  frame.col(2) = z;
+  return frame;
+}
+
 }  // namespace
 
 SurfaceCloth::SurfaceCloth(std::shared_ptr<const SurfaceModel> model, ClothMesh mesh)
@@ -47,6 +56,10 @@ TriangleMesh SurfaceCloth::triangle_mesh() const {
   return mesh;
 }
 
+Mat3d SurfaceCloth::vertex_frame(std::uint32_t vertex, ClothSide side) const {
+  return patch_frame(tangents_[vertex], side == ClothSide::kFace ? mesh_.normals[vertex] : Vec3d(-mesh_.normals[vertex]));
+}
+
 SurfaceHit SurfaceCloth::hit(std::uint32_t triangle, double u, double v, const Vec3& ray_direction,
                              double footprint_mm) const {
   const auto& [a, b, c] = mesh_.triangles[triangle];
@@ -61,15 +74,16 @@ SurfaceHit SurfaceCloth::hit(std::uint32_t triangle, double u, double v, const V
   if (hit.normal.dot(wo) < 0) hit.normal = -hit.normal;
 
   Vec3d z = interpolate(mesh_.normals).normalized();
-  if (z.dot(hit.normal) < 0) z = -z;
+  hit.side = z.dot(hit.normal) < 0 ? ClothSide::kBack : ClothSide::kFace;
+  if (hit.side == ClothSide::kBack) z = -z;
   const double cosine = z.dot(wo);
   if (cosine < kLeastCosine) z = (z + (kLeastCosine - cosine) * wo).normalized();
-  const Vec3d x = across(interpolate(tangents_), z);
-  const Vec3d y = z.cross(x);
-  hit.world_from_patch << x, y, z;
+  hit.world_from_patch = patch_frame(interpolate(tangents_), z);
+  hit.vertices = {a, b, c};
+  hit.vertex_weights = {1 - u - v, u, v};
 
   const Eigen::Vector2d fabric = interpolate(mesh_.fabric);
-  const double along_y = interpolate(bitangents_).dot(y) < 0 ? -fabric.y() : fabric.y();
+  const double along_y = interpolate(bitangents_).dot(hit.world_from_patch.col(1)) < 0 ? -fabric.y() : fabric.y();
   hit.point = {Vec2(static_cast<float>(fabric.x()), static_cast<float>(along_y)), static_cast<float>(footprint_mm)};
   return hit;
 }

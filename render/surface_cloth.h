@@ -10,6 +10,7 @@
 // Where an interpolated normal turns away from the eye though its triangle does not, it is bent back to the eye
 // (kLeastCosine). Tested in tests/render/surface_cloth_test.cpp.
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -31,6 +32,9 @@ struct SurfaceHit {
   Vec3d normal;            // of the triangle, on the side that is looked at
   Mat3d world_from_patch;  // columns: x, y, z of the patch frame
   SurfacePoint point;
+  ClothSide side;                         // kFace: the one out of which the mesh's normals point
+  std::array<std::uint32_t, 3> vertices;  // of the triangle
+  std::array<double, 3> vertex_weights;   // position = sum of weights times positions
 };
 
 class SurfaceCloth {
@@ -38,6 +42,11 @@ class SurfaceCloth {
   SurfaceCloth(std::shared_ptr<const SurfaceModel> model, ClothMesh mesh);
 
   TriangleMesh triangle_mesh() const;
+
+  std::size_t vertex_count() const { return mesh_.positions.size(); }
+  const Vec3d& vertex_position(std::uint32_t vertex) const { return mesh_.positions[vertex]; }
+  /// The patch frame at a vertex, seen from one side: hits in between interpolate what it is made of.
+  Mat3d vertex_frame(std::uint32_t vertex, ClothSide side) const;
 
   /// The point (1 - u - v) a + u b + v c of a triangle a, b, c, seen by a ray with that direction.
   SurfaceHit hit(std::uint32_t triangle, double u, double v, const Vec3& ray_direction, double footprint_mm) const;

@@ -66,6 +66,24 @@ std::vector<ChartRun> chart_runs(const SceneConfig& scene, const PictureRequest&
     runs.push_back({"volume", spp_label(n), {{"spp", n}}, {}, with(base, RenderMethod::kVolume, n)});
   }
 
+  // Both ways to shade surface cloth that has a choice.
+  const bool any_interactive = std::any_of(scene.cloths.begin(), scene.cloths.end(), [](const ClothConfig& cloth) {
+    return cloth.surface && cloth.surface->interactive;
+  });
+  for (const SurfaceMethod method : {SurfaceMethod::kSampled, SurfaceMethod::kInteractive}) {
+    if (!any_interactive) break;
+    const std::string name = method == SurfaceMethod::kSampled ? "sampled" : "interactive";
+    for (const int n : quick ? List{1, 4} : List{1, 4, 16, 64}) {
+      SceneVariant variant;
+      variant.surface_method = method;
+      runs.push_back({"exact, surfaces " + name,
+                      spp_label(n),
+                      {{"spp", n}, {"surface_method", name}},
+                      variant,
+                      with(base, RenderMethod::kExact, n)});
+    }
+  }
+
   const bool any_fibers =
       std::any_of(scene.cloths.begin(), scene.cloths.end(), [](const ClothConfig& cloth) { return !cloth.surface; });
   if (!any_fibers) return runs;  // nothing below changes surface models

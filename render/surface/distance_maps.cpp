@@ -3,6 +3,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cassert>
 #include <cmath>
 
@@ -12,6 +13,8 @@
 #include "fibers/math/random.h"
 #include "fibers/math/signed_distance.h"
 #include "fibers/math/spherical_map.h"
+#include "formats/input_error.h"
+#include "formats/tensor_file.h"
 
 namespace heddle {
 namespace {
@@ -42,7 +45,8 @@ Matrix principal_components(const Matrix& data, Eigen::Index count) {
 
 }  // namespace
 
-DistanceMaps::DistanceMaps(std::span<const Mat3> frames, const Visible& visible, const DistanceMapSettings& settings)
+DistanceMaps::DistanceMaps(std::span<const Mat3> frames, const Visible& visible, const DistanceMapSettings& settings,
+                           const std::function<void()>& vertex_done)
     : resolution_(settings.resolution) {
   assert(!frames.empty() && settings.resolution >= 4 && settings.terms >= 0);
   const LatLongGrid grid(resolution_);
@@ -63,6 +67,7 @@ DistanceMaps::DistanceMaps(std::span<const Mat3> frames, const Visible& visible,
       }
     }
     transform(map, distances.row(v).data());
+    if (vertex_done) vertex_done();
   });
 
   // Components over the vertices, cells weighted by solid angle; below the horizon, where only the far ends of Gaussians
@@ -97,6 +102,32 @@ DistanceMaps::DistanceMaps(std::span<const Mat3> frames, const Visible& visible,
     at[0] = 1;
     for (Eigen::Index k = 0; k < terms; ++k) at[k + 1] = shares(v, k);
   }
+}
+
+void DistanceMaps::write(const std::filesystem::path& path, const std::map<std::string, std::string>& metadata) const {
+  const auto rows = static_cast<std::uint64_t>(resolution_);
+  TensorFileWriter file;
+  for (const auto& [key, value] : metadata) file.set_metadata(key, value);
+  file.set_metadata("kind", "signed distances of visibility over the vertices of a surface");
+  file.add<float>("basis", {rows, rows, stride_}, basis_);
+  file.add<float>("coefficients", {vertex_count(), stride_}, coefficients_);
+  file.add<double>("compression_error", {1}, std::array<double, 1>{compression_error_});
+  file.write(path);
+}
+
+DistanceMaps DistanceMaps::read(const std::filesystem::path& path) {
+  const TensorFile file = TensorFile::read(path);
+  const std::vector<std::uint64_t> shape = file.shape("basis");
+  if (shape.size() != 3 || shape[0] != shape[1] || shape[0] < 4 || shape[0] > 4096 || shape[2] == 0 || shape[2] % 8 != 0) {
+    throw FileError(path.string() + ": 'basis' is not [resolution][resolution][multiple of 8]");
+  }
+  DistanceMaps maps;
+  maps.resolution_ = static_cast<int>(shape[0]);
+  maps.stride_ = shape[2];
+  maps.basis_ = file.get<float>("basis", shape);
+  maps.coefficients_ = file.get<float>("coefficients", {0, shape[2]});
+  maps.compression_error_ = file.get<double>("compression_error", {1})[0];
+  return maps;
 }
 
 SignedDistance DistanceMaps::evaluate(std::span<const float> coefficients, const Vec3d& direction) const {

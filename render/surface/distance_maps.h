@@ -11,8 +11,11 @@
 // poles lie at the ends of that thread, on the horizon, and the zenith is an ordinary point.
 // Thread-safe once built. Tested in tests/render/surface/distance_maps_test.cpp.
 
+#include <filesystem>
 #include <functional>
+#include <map>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "fibers/math/circular_gaussian.h"
@@ -35,9 +38,16 @@ class DistanceMaps {
   /// Is a point of the cloth open towards a direction, both in world space? Called from several threads.
   using Visible = std::function<bool(std::uint32_t vertex, const Vec3& direction)>;
 
-  /// frames [vertex]: world = frame * patch, columns thread 1, thread 2, normal.
-  DistanceMaps(std::span<const Mat3> frames, const Visible& visible, const DistanceMapSettings& settings);
+  /// frames [vertex]: world = frame * patch, columns thread 1, thread 2, normal. vertex_done is called after each, from any
+  /// thread; it may throw to stop.
+  DistanceMaps(std::span<const Mat3> frames, const Visible& visible, const DistanceMapSettings& settings,
+               const std::function<void()>& vertex_done = {});
 
+  void write(const std::filesystem::path& path, const std::map<std::string, std::string>& metadata) const;
+  /// Errors: FileError.
+  static DistanceMaps read(const std::filesystem::path& path);
+
+  std::size_t vertex_count() const { return coefficients_.size() / stride_; }
   /// Coefficients of a vertex, [stride()]. Those of a point between vertices are their linear interpolation.
   std::span<const float> coefficients(std::uint32_t vertex) const {
     return {&coefficients_[static_cast<std::size_t>(vertex) * stride_], stride_};
@@ -53,8 +63,10 @@ class DistanceMaps {
   std::size_t bytes() const { return sizeof(float) * (basis_.size() + coefficients_.size()); }
 
  private:
-  int resolution_;
-  std::size_t stride_;               // 1 for the mean map, then the components, padded with 0 to a multiple of 8
+  DistanceMaps() = default;
+
+  int resolution_ = 0;
+  std::size_t stride_ = 0;           // 1 for the mean map, then the components, padded with 0 to a multiple of 8
   std::vector<float> basis_;         // [row][column][stride]
   std::vector<float> coefficients_;  // [vertex][stride]
   double compression_error_ = 0;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cassert>
 #include <cmath>
+#include <utility>
 
 #include "fibers/math/quadrature.h"
 #include "fibers/math/special_functions.h"
@@ -107,11 +108,18 @@ struct InteractiveMicrocylinder::Around {
 
 InteractiveMicrocylinder::InteractiveMicrocylinder(const MicrocylinderFabric& fabric,
                                                    const InteractiveSettings& settings)
+    : InteractiveMicrocylinder(fabric, settings,
+                               WeightingTable(fabric, tangent_samples(fabric, settings.most_tangents),
+                                              settings.weighting, settings.table)) {}
+
+InteractiveMicrocylinder::InteractiveMicrocylinder(const MicrocylinderFabric& fabric,
+                                                   const InteractiveSettings& settings, WeightingTable table)
     : fabric_(fabric),
       settings_(settings),
       samples_(tangent_samples(fabric, settings.most_tangents)),
-      table_(fabric, samples_, settings.weighting, settings.table),
+      table_(std::move(table)),
       gains_(settings.printed ? std::make_unique<const SigmoidGains>() : nullptr) {
+  assert(samples_.size() == table_.ranks().size());
   prepare();
 }
 

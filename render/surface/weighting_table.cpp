@@ -8,6 +8,8 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "formats/input_error.h"
+#include "formats/tensor_file.h"
 #include "render/surface/tangent_curve.h"
 
 namespace heddle {
@@ -64,6 +66,9 @@ GridPosition grid_position(const Vec3d& direction, int rows, int columns, double
           {(1 - down) * (1 - across), (1 - down) * across, down * (1 - across), down * across}};
 }
 
+// One of the steps between tangents; the others are it times powers of 2.
+constexpr double kFinestStep = radians(4.5);
+
 // W is 0 at the horizon itself; the last row of a table of directions stands just above it.
 constexpr double kLastPolar = radians(89);
 
@@ -91,7 +96,9 @@ std::vector<TangentSample> tangent_samples(const MicrocylinderFabric& fabric, in
     double range = 0;
     for (const TangentPiece& piece : pieces) range += piece.end - piece.begin;
     const ThreadScattering scattering(thread.scattering, fabric.conventions);
-    const double step = std::max(1.5 * scattering.surface_deviation(), range / most);
+    const double wanted = 1.5 * scattering.surface_deviation();
+    const double class_step = kFinestStep * std::exp2(std::round(std::log2(wanted / kFinestStep)));
+    const double step = std::max(class_step, range / most);
     for (const TangentPiece& piece : pieces) {
       const double extent = piece.end - piece.begin;
       const int count = std::max(1, static_cast<int>(std::ceil(extent / step - 1e-9)));
@@ -271,6 +278,66 @@ double WeightingTable::value(std::size_t tangent, const Outgoing& outgoing, cons
     }
   }
   return std::max(sum, 0.0);
+}
+
+void WeightingTable::write(const std::filesystem::path& path, const std::map<std::string, std::string>& metadata) const {
+  const auto joined = [](const std::vector<std::vector<float>>& parts) {
+    std::vector<float> all;
+    for (const std::vector<float>& part : parts) all.insert(all.end(), part.begin(), part.end());
+    return all;
+  };
+  TensorFileWriter file;
+  for (const auto& [key, value] : metadata) file.set_metadata(key, value);
+  file.set_metadata("kind", "weights of threads averaged over Gaussians");
+  const std::vector<float> outgoing = joined(wo_);
+  const std::vector<float> axes = joined(axis_);
+  file.add<std::int32_t>("grid", {3}, std::array<std::int32_t, 3>{wo_rows_, axis_rows_, columns_});
+  file.add<std::int32_t>("ranks", {ranks_.size()}, std::vector<std::int32_t>(ranks_.begin(), ranks_.end()));
+  file.add<float>("outgoing", {outgoing.size()}, outgoing);
+  file.add<float>("axes", {axes.size()}, axes);
+  file.write(path);
+}
+
+WeightingTable WeightingTable::read(const std::filesystem::path& path) {
+  const TensorFile file = TensorFile::read(path);
+  const std::vector<std::int32_t> grid = file.get<std::int32_t>("grid", {3});
+  const std::vector<std::int32_t> ranks = file.get<std::int32_t>("ranks", {0});
+  const std::vector<float> outgoing = file.get<float>("outgoing", {0});
+  const std::vector<float> axes = file.get<float>("axes", {0});
+  const auto within = [](std::int32_t value, std::int32_t low, std::int32_t high) {
+    return low <= value && value <= high;
+  };
+  bool fits = within(grid[0], 2, 4096) && within(grid[1], 2, 4096) && within(grid[2], 4, 4096) && !ranks.empty();
+  std::size_t whole = 0;
+  for (const std::int32_t rank : ranks) {
+    fits = fits && within(rank, 1, 1 << 24);
+    whole += static_cast<std::size_t>(std::max(rank, 0));
+  }
+  const std::size_t wo_cells = fits ? static_cast<std::size_t>(grid[0]) * static_cast<std::size_t>(grid[2]) : 0;
+  const std::size_t axis_cells = fits ? kLevels * static_cast<std::size_t>(grid[1]) * static_cast<std::size_t>(grid[2]) : 0;
+  if (!fits || outgoing.size() != wo_cells * whole || axes.size() != axis_cells * whole) {
+    throw FileError(path.string() + ": not the sizes of a table of weights");
+  }
+  WeightingTable table;
+  table.wo_rows_ = grid[0];
+  table.axis_rows_ = grid[1];
+  table.columns_ = grid[2];
+  auto from_outgoing = outgoing.begin();
+  auto from_axes = axes.begin();
+  table.first_.push_back(0);
+  for (const std::int32_t rank : ranks) {
+    const auto count = static_cast<std::size_t>(rank);
+    const auto take = [](auto& from, std::size_t size) {
+      const auto begin = from;
+      from += static_cast<std::ptrdiff_t>(size);
+      return std::vector<float>(begin, from);
+    };
+    table.ranks_.push_back(rank);
+    table.first_.push_back(table.first_.back() + count);
+    table.wo_.push_back(take(from_outgoing, wo_cells * count));
+    table.axis_.push_back(take(from_axes, axis_cells * count));
+  }
+  return table;
 }
 
 std::size_t WeightingTable::bytes() const {

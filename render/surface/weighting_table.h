@@ -15,7 +15,10 @@
 
 #include <array>
 #include <cstdint>
+#include <filesystem>
+#include <map>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "fibers/math/vector.h"
@@ -37,7 +40,9 @@ struct TangentSample {
 };
 
 /// Samples at the middles of equal parts of every ramp of the tangent curves, one for every flat segment. Parts are at most
-/// 1.5 times the deviation of the thread's surface lobe, but no thread has more than `most` of them.
+/// that one of 4.5, 9, 18, ... degrees which is nearest to 1.5 times the deviation of the thread's surface lobe, so that all
+/// deviations from 4.2 to 8.5 degrees, or 8.5 to 17, ..., have the same samples; but no thread has more than `most` of them
+/// and one for each piece.
 std::vector<TangentSample> tangent_samples(const MicrocylinderFabric& fabric, int most);
 
 enum class Weighting : std::uint8_t { kConsistent, kPrinted };
@@ -68,7 +73,13 @@ class WeightingTable {
   /// [tangent] singular values kept.
   const std::vector<int>& ranks() const { return ranks_; }
 
+  void write(const std::filesystem::path& path, const std::map<std::string, std::string>& metadata) const;
+  /// Errors: FileError.
+  static WeightingTable read(const std::filesystem::path& path);
+
  private:
+  WeightingTable() = default;
+
   // Sharpness 0, four in steps of 4, and the limit of a direction.
   static constexpr std::array<double, 4> kSharpnesses = {2, 8, 32, 128};
   static constexpr int kLevels = 6;

@@ -152,6 +152,20 @@ TEST(Chart, LaddersHoldEverySetting) {
   EXPECT_TRUE(labels_of(chart_runs(SceneConfig{}, {}, {}), "exact, order of the transfer").empty());
 }
 
+TEST(Chart, SurfacesThatHaveAChoiceAreShadedBothWays) {
+  SceneConfig scene;
+  scene.cloths.emplace_back().surface.emplace();
+  EXPECT_TRUE(labels_of(chart_runs(scene, {}, {}), "exact, surfaces interactive").empty());
+  scene.cloths[0].surface->interactive.emplace();
+  for (const char* name : {"exact, surfaces sampled", "exact, surfaces interactive"}) {
+    EXPECT_EQ(labels_of(chart_runs(scene, {}, {.quick = true}), name), (std::vector<std::string>{"1 spp", "4 spp"}));
+  }
+  for (const ChartRun& run : chart_runs(scene, {}, {})) {
+    EXPECT_EQ(run.settings.contains("surface_method"), run.variant.surface_method.has_value());
+    EXPECT_EQ(run.method == "exact, surfaces interactive", run.variant.surface_method == SurfaceMethod::kInteractive);
+  }
+}
+
 constexpr char kScene[] = R"(name = "tiny <swatch>, \"quoted\""
 
 [camera]

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "formats/image_file.h"
 #include "tests/pipeline/program.h"
@@ -329,6 +330,56 @@ TEST(SurfacesEndToEnd, SurfacesAloneNeedNoStagesAndAnEditedOneMakesANewPicture) 
   const Json info = shop.report({"info", "own.toml"});
   EXPECT_EQ(info.at("model"), "microcylinder");
   EXPECT_EQ(shop.report({"info", "alone.toml"}).at("fabrics").at(0), "own.toml");
+}
+
+TEST(SurfacesEndToEnd, ThreadsLightsAndCamerasAreEditedWithoutPrecomputingAgain) {
+  const Workshop shop;
+  const std::string threads = text_of(fs::path(HEDDLE_SOURCE_DIR) / "configs/fabrics/linen-plain.toml");
+  std::ofstream(shop / "own.toml") << threads;
+  std::string scene = kSmallScene;
+  scene.replace(scene.find("[4, 4]"), 6, "[0.2, 4]");
+  scene += scene_with_surface(shop, "own.toml");
+  std::ofstream(shop / "edited.toml") << scene + "surface_method = \"interactive\"\n";
+
+  // Which of the surface's stages, and of the first picture, were built.
+  const auto built = [&](const char* folder) {
+    std::multiset<std::string> stages;
+    const Json report = shop.report({"run", "edited.toml", "-o", folder});
+    for (const Json& entry : report.at("stages")) {
+      const auto stage = entry.at("stage").get<std::string>();
+      if ((stage.starts_with("surface") || stage == "edited") && entry.at("built").get<bool>()) stages.insert(stage);
+    }
+    return stages;
+  };
+  using Stages = std::multiset<std::string>;
+  EXPECT_EQ(built("pictures.first"), (Stages{"surface-weights", "surface-maps", "surface-maps", "edited"}));
+  EXPECT_EQ(built("pictures.again"), Stages{});
+
+  std::string other = threads;
+  for (const auto& [from, to] : {std::pair{"ior = 1.46", "ior = 1.6"}, {"kd = 0.3", "kd = 0.5"},
+                                 {"gamma_s_deg = 12", "gamma_s_deg = 9"}, {"gamma_v_deg = 24", "gamma_v_deg = 40"},
+                                 {"albedo = [0.06, 0.24, 0.3]", "albedo = [0.3, 0.2, 0.1]"}}) {
+    other = edited(other.c_str(), from, to);
+  }
+  std::ofstream(shop / "own.toml") << other;
+  EXPECT_EQ(built("pictures.threads"), Stages{"edited"});
+  EXPECT_NE(text_of(shop / "pictures.threads" / "edited.exr"), text_of(shop / "pictures.first" / "edited.exr"));
+
+  scene = edited(edited(scene.c_str(), "fov_deg = 25", "fov_deg = 30").c_str(), "sharpness = 20", "sharpness = 50");
+  std::ofstream(shop / "edited.toml") << scene + "surface_method = \"interactive\"\n";
+  EXPECT_EQ(built("pictures.lights"), Stages{"edited"});
+
+  // A curve is another table; what stands over the cloth makes other maps.
+  std::ofstream(shop / "own.toml") << edited(other.c_str(), "offsets_deg = [-25, 25]", "offsets_deg = [-20, 20]");
+  EXPECT_EQ(built("pictures.curves"), (Stages{"surface-weights", "edited"}));
+  std::ofstream(shop / "edited.toml") << edited(scene.c_str(), "[0.2, 4]", "[0.4, 4]") +
+                                             "surface_method = \"interactive\"\n";
+  EXPECT_EQ(built("pictures.shapes"), (Stages{"surface-maps", "surface-maps", "edited"}));
+
+  // Sampled, nothing of it is asked for.
+  fs::remove_all(shop / "cache" / "surface-maps");
+  std::ofstream(shop / "edited.toml") << scene;
+  EXPECT_EQ(built("pictures.sampled"), Stages{"edited"});
 }
 
 TEST(RivalsEndToEnd, EveryMethodRendersTheScene) {

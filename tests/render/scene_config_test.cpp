@@ -174,6 +174,12 @@ TEST_F(SceneConfigTest, MistakesAreLocated) {
       {"fabric = \"silk.toml\"", "surface = \"silk.toml\"", "model"},
       {"fabric = \"silk.toml\"", "surface = \"wool.toml\"", "wool.toml"},
       {"fabric = \"silk.toml\"", "surface = \"velvet\"", "underlay"},
+      {"fabric = \"silk.toml\"", "surface = \"velvet\"\nsurface_method = \"fast\"", "one of \"sampled\", \"interactive\""},
+      {"fabric = \"silk.toml\"", "surface = \"irawan-denim\"\nsurface_method = \"interactive\"",
+       "irawan-denim has no interactive form"},
+      {"fabric = \"silk.toml\"", "surface = \"irawan-denim\"\nsurface_method = \"interactive\"",
+       "silk-crepe-de-chine, silk-shot, velvet"},
+      {"fabric = \"silk.toml\"", "fabric = \"silk.toml\"\nsurface_method = \"interactive\"", "surface_method"},
       {"fabric = \"silk.toml\"", "fabric = \"silk.toml\"\nsurface = \"velvet\"", "either fabric or surface"},
       {"fabric = \"silk.toml\"\n", "", "either fabric or surface"},
       {"spp = 64", "spp = 63", "even"},
@@ -195,6 +201,9 @@ TEST_F(SceneConfigTest, ASurfaceStandsInForAFabric) {
   EXPECT_TRUE(velvet.fabric.empty());
   EXPECT_EQ(velvet.flat_height_mm, 20);
   ASSERT_TRUE(velvet.surface && velvet.surface->model);
+  EXPECT_EQ(velvet.surface_method, SurfaceMethod::kSampled);
+  EXPECT_EQ(cloth("surface = \"velvet\"\nsurface_method = \"interactive\"\n").surface_method,
+            SurfaceMethod::kInteractive);
   EXPECT_EQ(velvet.surface->name, "velvet");
   const Vec3d wi = Vec3d(0.1, 0.5, 1).normalized();
   const Vec3d wo = Vec3d(0.2, -0.3, 1).normalized();

@@ -7,6 +7,8 @@
 
 #include "fibers/math/random.h"
 #include "fibers/math/sampling.h"
+#include "formats/tensor_file.h"
+#include "tests/formats/file_fixture.h"
 
 namespace heddle {
 namespace {
@@ -132,6 +134,38 @@ TEST(DistanceMapsLaw, LinesFollowTheBorder) {
   }
   EXPECT_GT(visibility_line({1, Vec3d::Zero()}, 1, Vec3d(1, 0, 0), Vec3d(0, 1, 0)).distance, 10);
   EXPECT_LT(visibility_line({-1, Vec3d::Zero()}, 1, Vec3d(1, 0, 0), Vec3d(0, 1, 0)).distance, -10);
+}
+
+class DistanceMapsFormat : public FileFixture {};
+
+TEST_F(DistanceMapsFormat, ReadsWhatItWrote) {
+  const DistanceMaps maps = wall_map(Vec3(0.6F, 0.3F, -0.4F).normalized(), Mat3::Identity(), 16);
+  maps.write(folder_ / "maps.safetensors", {{"key", "abc"}});
+  EXPECT_EQ(TensorFile::read(folder_ / "maps.safetensors").metadata_value("key"), "abc");
+  const DistanceMaps read = DistanceMaps::read(folder_ / "maps.safetensors");
+  EXPECT_EQ(read.vertex_count(), 1U);
+  EXPECT_EQ(read.compression_error(), maps.compression_error());
+  RandomStream random(9, RandomStage::kTest, 0, 0);
+  for (int k = 0; k < 100; ++k) {
+    const Vec3d w = upper_direction(random);
+    EXPECT_EQ(read.evaluate(read.coefficients(0), w).distance, maps.evaluate(maps.coefficients(0), w).distance);
+  }
+}
+
+TEST_F(DistanceMapsFormat, SizesThatDoNotFitAreNamed) {
+  const auto message = [&](std::uint64_t rows, std::uint64_t columns, std::uint64_t stride, std::uint64_t other_stride) {
+    TensorFileWriter file;
+    file.add<float>("basis", {rows, columns, stride}, std::vector<float>(rows * columns * stride));
+    file.add<float>("coefficients", {2, other_stride}, std::vector<float>(2 * other_stride));
+    file.add<double>("compression_error", {1}, std::vector<double>(1));
+    file.write(folder_ / "bad.safetensors");
+    return error_of([&] { DistanceMaps::read(folder_ / "bad.safetensors"); });
+  };
+  EXPECT_EQ(message(4, 4, 8, 8), "no error");
+  for (const auto& [rows, columns, stride] : {std::array<std::uint64_t, 3>{4, 5, 8}, {3, 3, 8}, {4, 4, 9}, {4, 4, 0}}) {
+    EXPECT_NE(message(rows, columns, stride, stride).find("bad.safetensors: 'basis'"), std::string::npos);
+  }
+  EXPECT_NE(message(4, 4, 8, 16).find("coefficients"), std::string::npos);
 }
 
 }  // namespace

@@ -7,6 +7,8 @@
 
 #include "fibers/math/random.h"
 #include "fibers/math/sampling.h"
+#include "formats/tensor_file.h"
+#include "tests/formats/file_fixture.h"
 
 namespace heddle {
 namespace {
@@ -49,10 +51,21 @@ TEST(TangentSamples, StandForTheWholeCurve) {
   }
   EXPECT_NEAR(share[0], 1, 1e-12);
   EXPECT_NEAR(share[1], 1, 1e-12);
-  // Two flat segments, and 70 degrees in parts of at most 15; one flat segment.
-  EXPECT_EQ(samples.size(), 2U + 5U + 1U);
+  // Two flat segments, and 70 degrees in parts of at most 18; one flat segment.
+  EXPECT_EQ(samples.size(), 2U + 4U + 1U);
   EXPECT_EQ(samples[0].deviation, 0);
   EXPECT_EQ(tangent_samples(fabric, 2).size(), 2U + 2U + 1U);
+}
+
+TEST(TangentSamplesLaw, ClassesOfWidthsShareTheirSamples) {
+  MicrocylinderFabric fabric = plain(0.5);
+  const auto count = [&](double gamma_s) {
+    fabric.threads[0].scattering.gamma_s = radians(gamma_s);
+    return tangent_samples(fabric, 100).size();
+  };
+  EXPECT_EQ(count(8.6), count(16.8));
+  EXPECT_EQ(count(4.3), count(8.4));
+  EXPECT_GT(count(8.4), count(8.6));
 }
 
 TEST(ThreadWeightsLaw, SharesOfOneAtMost) {
@@ -101,8 +114,8 @@ TEST(ThreadWeightsLaw, GapsTakeTheirShareOfTheConsistentWeights) {
   for (const double w : thread_weights(plain(0.25), tangents, Weighting::kConsistent, up, up)) sum += w;
   double full = 0;
   for (const double w : thread_weights(plain(0.5), tangents, Weighting::kConsistent, up, up)) full += w;
-  // <M P> / (<P> + 1) against <M P> / <P>, P = cos of four tangents within +-25 degrees.
-  const double p = 0.5 * (std::cos(radians(50.0 / 8)) + std::cos(radians(150.0 / 8)));
+  // <M P> / (<P> + 1) against <M P> / <P>, P = cos of three tangents within +-25 degrees.
+  const double p = (1 + 2 * std::cos(radians(50.0 / 3))) / 3;
   EXPECT_NEAR(sum / full, p / (p + 1), 1e-12);
 }
 
@@ -173,6 +186,47 @@ TEST(WeightingTable, FewerSingularValuesForLessContribution) {
     for (const int r : table.ranks()) rank += static_cast<std::size_t>(r);
     EXPECT_EQ(table.bytes(), 4 * rank * (12 * 6 + 6 * 12 * 12));
   }
+}
+
+class WeightingTableFormat : public FileFixture {};
+
+TEST_F(WeightingTableFormat, ReadsWhatItWrote) {
+  const MicrocylinderFabric fabric = plain(0.4);
+  WeightingTableSettings settings;
+  settings.columns = 8;
+  settings.rows = 4;
+  const WeightingTable table(fabric, tangent_samples(fabric, 3), Weighting::kConsistent, settings);
+  table.write(folder_ / "table.safetensors", {{"key", "abc"}});
+  EXPECT_EQ(TensorFile::read(folder_ / "table.safetensors").metadata_value("key"), "abc");
+  const WeightingTable read = WeightingTable::read(folder_ / "table.safetensors");
+  EXPECT_EQ(read.ranks(), table.ranks());
+  EXPECT_EQ(read.bytes(), table.bytes());
+  RandomStream random(8, RandomStage::kTest, 0, 0);
+  for (int k = 0; k < 200; ++k) {
+    const Vec3d wo = upper_direction(random);
+    const Vec3d axis = upper_direction(random);
+    const std::size_t t = static_cast<std::size_t>(k) % table.ranks().size();
+    EXPECT_EQ(read.value(t, read.outgoing(wo), axis, 3.0 * k), table.value(t, table.outgoing(wo), axis, 3.0 * k));
+  }
+}
+
+TEST_F(WeightingTableFormat, SizesThatDoNotFitAreNamed) {
+  const auto message = [&](std::vector<std::int32_t> grid, std::vector<std::int32_t> ranks, std::size_t outgoing) {
+    TensorFileWriter file;
+    file.add<std::int32_t>("grid", {grid.size()}, grid);
+    file.add<std::int32_t>("ranks", {ranks.size()}, ranks);
+    file.add<float>("outgoing", {outgoing}, std::vector<float>(outgoing));
+    file.add<float>("axes", {6 * 16}, std::vector<float>(6 * 16));
+    file.write(folder_ / "bad.safetensors");
+    return error_of([&] { WeightingTable::read(folder_ / "bad.safetensors"); });
+  };
+  EXPECT_EQ(message({2, 4, 4}, {1}, 8), "no error");
+  for (const auto& ranks : {std::vector<std::int32_t>{2}, {1, 1}, {0}, {-1}, {2000000000}}) {
+    EXPECT_NE(message({2, 4, 4}, ranks, 8).find("bad.safetensors: not the sizes"), std::string::npos);
+  }
+  EXPECT_NE(message({2, 4, 4}, {1}, 9).find("sizes"), std::string::npos);
+  EXPECT_NE(message({1, 8, 4}, {1}, 4).find("sizes"), std::string::npos);
+  EXPECT_NE(message({2, 4, -4}, {1}, 8).find("sizes"), std::string::npos);
 }
 
 }  // namespace

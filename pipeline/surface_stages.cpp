@@ -1,0 +1,138 @@
+#include "pipeline/surface_stages.h"
+
+#include <fmt/format.h>
+
+#include <map>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "formats/content_hash.h"
+#include "pipeline/interrupt.h"
+
+namespace heddle {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+
+/// All that a weighting table depends on.
+std::string weights_text(const MicrocylinderFabric& fabric, const InteractiveSettings& settings) {
+  Json tangents = Json::array();
+  for (const TangentSample& sample : tangent_samples(fabric, settings.most_tangents)) {
+    tangents.push_back({sample.thread, sample.direction, sample.sine, sample.cosine, sample.share});
+  }
+  Json shares = Json::array();
+  for (const MicrocylinderThread& thread : fabric.threads) shares.push_back(thread.share);
+  const WeightingTableSettings& table = settings.table;
+  return Json{{"tangents", tangents},
+              {"shares", shares},
+              {"blend", fabric.conventions.blend},
+              {"table", {table.columns, table.rows, table.contribution}}}
+      .dump();
+}
+
+/// The shapes of everything in a scene.
+std::string geometry_text(const SceneConfig& config, const std::function<std::string(const fs::path&)>& geometry_key) {
+  Json cloths = Json::array();
+  for (const ClothConfig& cloth : config.cloths) {
+    Json shape = {{"underlay", cloth.underlay}};
+    if (cloth.mesh) {
+      shape["mesh"] = {content_hash_of_file(cloth.mesh->path), cloth.mesh->mm_per_unit};
+    } else {
+      shape["flat_mm"] = {cloth.flat_width_mm, cloth.flat_height_mm};
+    }
+    if (!cloth.surface) shape["fibers"] = geometry_key(cloth.fabric);
+    cloths.push_back(shape);
+  }
+  Json meshes = Json::array();
+  for (const MeshFile& mesh : config.meshes) meshes.push_back({content_hash_of_file(mesh.path), mesh.mm_per_unit});
+  return Json{{"cloths", cloths}, {"meshes", meshes}}.dump();
+}
+
+Stage maps_stage(const std::string& geometry, std::size_t cloth, ClothSide side) {
+  return make_stage("surface-maps", 1, ".safetensors", geometry,
+                    {{"cloth", fmt::format("{}", cloth)}, {"side", side == ClothSide::kFace ? "face" : "back"}});
+}
+
+}  // namespace
+
+SurfaceStages::SurfaceStages(const SceneConfig& config, StageContext& context,
+                             const std::function<std::string(const fs::path&)>& geometry_key)
+    : context_(&context) {
+  std::string geometry;
+  for (const ClothConfig& cloth : config.cloths) {
+    if (!cloth.surface) continue;
+    const std::size_t index = surfaces_.size();
+    surfaces_.emplace_back();
+    if (cloth.surface_method != SurfaceMethod::kInteractive) continue;
+    if (geometry.empty()) geometry = geometry_text(config, geometry_key);
+    surfaces_.back() = Surface{
+        &*cloth.surface,
+        make_stage("surface-weights", 1, ".safetensors", weights_text(*cloth.surface->interactive, {}), {}),
+        maps_stage(geometry, index, ClothSide::kFace), maps_stage(geometry, index, ClothSide::kBack)};
+  }
+}
+
+std::vector<std::string> SurfaceStages::keys() const {
+  std::vector<std::string> keys;
+  for (const std::optional<Surface>& surface : surfaces_) {
+    if (!surface) continue;
+    for (const Stage* stage : {&surface->weights, &surface->face, &surface->back}) keys.push_back(stage->key);
+  }
+  return keys;
+}
+
+std::vector<StageCost> SurfaceStages::costs() const {
+  std::map<std::string, StageCost> by_key;  // cloths of one fabric share their table
+  for (const std::optional<Surface>& surface : surfaces_) {
+    if (!surface) continue;
+    for (const Stage* stage : {&surface->weights, &surface->face, &surface->back}) {
+      by_key.emplace(stage->key, recorded_cost(*stage, context_->cache));
+    }
+  }
+  std::vector<StageCost> costs;
+  for (auto& [key, cost] : by_key) costs.push_back(std::move(cost));
+  return costs;
+}
+
+std::shared_ptr<const DistanceMaps> SurfaceStages::maps(const Surface& surface, ClothSide side, const ClothScene& scene,
+                                                        const SurfaceCloth& cloth) const {
+  const Stage& stage = side == ClothSide::kFace ? surface.face : surface.back;
+  const Artifact artifact =
+      provide_artifact(stage, surface.fabric->name, *context_, [&](const fs::path& path, StageResult&) {
+        Progress progress(*context_->console, stage.name, "vertices", cloth.vertex_count());
+        const auto vertex_done = [&progress] {
+          stop_if_interrupted();
+          progress.advance(1);
+        };
+        bake_distance_maps(scene, cloth, side, vertex_done).write(path, stage.metadata);
+      });
+  return std::make_shared<const DistanceMaps>(DistanceMaps::read(artifact.path));
+}
+
+std::vector<std::shared_ptr<const InteractiveSurface>> SurfaceStages::load(const ClothScene& scene) const {
+  std::vector<std::shared_ptr<const InteractiveSurface>> loaded;
+  std::map<std::string, std::shared_ptr<const InteractiveMicrocylinder>> models;  // by the fabric's text
+  for (const std::optional<Surface>& surface : surfaces_) {
+    const SurfaceCloth& cloth = scene.surfaces()[loaded.size()];
+    loaded.emplace_back();
+    if (!surface) continue;
+    const MicrocylinderFabric& fabric = *surface->fabric->interactive;
+    auto& model = models[surface->fabric->text];
+    if (!model) {
+      const Artifact table = provide_artifact(
+          surface->weights, surface->fabric->name, *context_, [&](const fs::path& path, StageResult&) {
+            const InteractiveSettings settings;
+            WeightingTable(fabric, tangent_samples(fabric, settings.most_tangents), settings.weighting, settings.table)
+                .write(path, surface->weights.metadata);
+          });
+      model = std::make_shared<const InteractiveMicrocylinder>(fabric, InteractiveSettings{},
+                                                               WeightingTable::read(table.path));
+    }
+    loaded.back() = std::make_shared<const InteractiveSurface>(
+        model, maps(*surface, ClothSide::kFace, scene, cloth), maps(*surface, ClothSide::kBack, scene, cloth));
+  }
+  return loaded;
+}
+
+}  // namespace heddle
