@@ -11,6 +11,8 @@
 
 #include <vector>
 
+#include "fibers/math/float8.h"
+
 namespace heddle {
 
 struct CircularGaussian {
@@ -50,6 +52,19 @@ struct VisibilityLine {
 /// by one Gauss-Legendre panel of 20 nodes between the points where the line enters and leaves what the first one covers.
 /// Right wherever the means lie, also at +-pi/2: error below 4e-6 of pi min(s, 1) min(s', 1) in all tests. 0.2 to 0.4 us.
 double clipped_gaussians(const CircularGaussian& theta, const CircularGaussian& phi, const VisibilityLine& line);
+
+/// The same for eight at a time, in single precision and with fewer nodes; theta means within [-pi/2, pi/2], phi means within
+/// [-pi, pi], widths up to 1000. Error below 1e-3 of pi min(s, 1) min(s', 1), 6e-5 RMS.
+struct CircularGaussian8 {
+  Float8 mean;
+  Float8 width;
+};
+struct VisibilityLine8 {
+  Float8 distance;
+  Float8 theta_gradient;
+  Float8 phi_gradient;
+};
+Float8 clipped_gaussians(const CircularGaussian8& theta, const CircularGaussian8& phi, const VisibilityLine8& line);
 
 /// The same by nested panels with breaks at every scale: error below 1e-10. Tens of microseconds.
 double clipped_gaussians_quadrature(const CircularGaussian& theta, const CircularGaussian& phi,

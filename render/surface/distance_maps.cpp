@@ -19,6 +19,8 @@
 namespace heddle {
 namespace {
 
+constexpr float kFar = 100;  // radians: beyond everything
+
 using Matrix = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 // Patch directions in the grid's frame: its pole is x. A reflection, which leaves distances alone.
@@ -166,14 +168,74 @@ SignedDistance DistanceMaps::evaluate(std::span<const float> coefficients, const
   return {std::lerp(upper, lower, down), length > 1e-6 ? Vec3d(gradient / length) : Vec3d(Vec3d::Zero())};
 }
 
+SignedDistance8 DistanceMaps::evaluate(std::span<const float> coefficients, const Vec8& directions) const {
+  assert(coefficients.size() == stride_);
+  const Vec8 w = {directions.z, directions.y, directions.x};
+  const float step_polar = kPif / static_cast<float>(resolution_);
+  const float step_azimuth = 2 * step_polar;
+  const Float8 sine = max8(sqrt8(w.x * w.x + w.y * w.y), splat8(1e-7F));
+  const Float8 row = atan2_8(sine, w.z) * (1 / step_polar) - 0.5F;
+  const Float8 column = atan2_8(w.y, w.x) * (1 / step_azimuth) + (static_cast<float>(resolution_) - 0.5F);  // > 0
+  const Int8 r = __builtin_convertvector(max8(min8(row, splat8(static_cast<float>(resolution_ - 2))), Float8{}), Int8);
+  const Int8 c = __builtin_convertvector(column, Int8);
+  const Float8 down = row - __builtin_convertvector(r, Float8);
+  const Float8 across = column - __builtin_convertvector(c, Float8);
+
+  Float8 v00, v01, v10, v11;
+  for (int k = 0; k < kFloat8Lanes; ++k) {
+    const auto cell = [&](int i, int j) {
+      return &basis_[(static_cast<std::size_t>(i) * static_cast<std::size_t>(resolution_) +
+                      static_cast<std::size_t>(j % resolution_)) *
+                     stride_];
+    };
+    const float* const cells[4] = {cell(r[k], c[k]), cell(r[k], c[k] + 1), cell(r[k] + 1, c[k]),
+                                   cell(r[k] + 1, c[k] + 1)};
+    Float8 sums[4] = {};
+    for (std::size_t j = 0; j < stride_; j += kFloat8Lanes) {
+      const Float8 own = load8(&coefficients[j]);
+      for (int n = 0; n < 4; ++n) sums[n] += own * load8(cells[n] + j);
+    }
+    float values[4];
+    sums8(sums[0], sums[1], sums[2], sums[3], values);
+    v00[k] = values[0];
+    v01[k] = values[1];
+    v10[k] = values[2];
+    v11[k] = values[3];
+  }
+  const Float8 upper = v00 + across * (v01 - v00);
+  const Float8 lower = v10 + across * (v11 - v10);
+  const Float8 by_polar = (lower - upper) / step_polar;
+  const Float8 by_azimuth = (v01 - v00 + down * (v11 - v10 - v01 + v00)) / (step_azimuth * sine);
+  const Float8 cosine_azimuth = w.x / sine;
+  const Float8 sine_azimuth = w.y / sine;
+  const Vec8 swapped_gradient = {by_polar * cosine_azimuth * w.z - by_azimuth * sine_azimuth,
+                                 by_polar * sine_azimuth * w.z + by_azimuth * cosine_azimuth, -by_polar * sine};
+  const Float8 length = sqrt8(swapped_gradient.x * swapped_gradient.x + swapped_gradient.y * swapped_gradient.y +
+                              swapped_gradient.z * swapped_gradient.z);
+  const Float8 scale = length > 1e-6F ? 1 / length : Float8{};
+  return {upper + down * (lower - upper),
+          {scale * swapped_gradient.z, scale * swapped_gradient.y, scale * swapped_gradient.x}};
+}
+
 VisibilityLine visibility_line(const SignedDistance& at, double cos_theta, const Vec3d& along_theta,
                                const Vec3d& along_phi) {
   const double theta = at.gradient.dot(along_theta);
   const double phi = at.gradient.dot(along_phi) * cos_theta;
   const double length = std::hypot(theta, phi);
-  constexpr double kFar = 100;  // radians: beyond everything
-  if (length < 1e-9) return {at.distance > 0 ? kFar : -kFar, 1, 0};
+  if (length < 1e-9) return {static_cast<double>(at.distance > 0 ? kFar : -kFar), 1, 0};
   return {at.distance / length, theta / length, phi / length};
+}
+
+VisibilityLine8 visibility_line(const SignedDistance8& at, Float8 cos_theta, const Vec8& along_theta,
+                                const Vec8& along_phi) {
+  const Vec8& g = at.gradient;
+  const Float8 theta = g.x * along_theta.x + g.y * along_theta.y + g.z * along_theta.z;
+  const Float8 phi = (g.x * along_phi.x + g.y * along_phi.y + g.z * along_phi.z) * cos_theta;
+  const Float8 length = sqrt8(theta * theta + phi * phi);
+  const Int8 flat = length < 1e-6F;
+  const Float8 scale = 1 / (flat ? splat8(1) : length);
+  return {flat ? (at.distance > 0 ? splat8(kFar) : splat8(-kFar)) : at.distance * scale,
+          flat ? splat8(1) : theta * scale, flat ? Float8{} : phi * scale};
 }
 
 }  // namespace heddle

@@ -33,6 +33,11 @@ struct SignedDistance {
   Vec3d gradient;   // unit, across the direction, towards the visible side; 0 where the map is flat
 };
 
+struct SignedDistance8 {
+  Float8 distance;
+  Vec8 gradient;
+};
+
 class DistanceMaps {
  public:
   /// Is a point of the cloth open towards a direction, both in world space? Called from several threads.
@@ -57,6 +62,9 @@ class DistanceMaps {
   /// direction: unit, in the patch frame.
   SignedDistance evaluate(std::span<const float> coefficients, const Vec3d& direction) const;
 
+  /// The same of eight directions, in single precision.
+  SignedDistance8 evaluate(std::span<const float> coefficients, const Vec8& directions) const;
+
   /// Root mean square over vertices and the upper hemisphere of what compression changed, radians.
   double compression_error() const { return compression_error_; }
   /// Components and coefficients.
@@ -77,6 +85,8 @@ class DistanceMaps {
 /// are measured from it. All is visible or hidden where there is no gradient.
 VisibilityLine visibility_line(const SignedDistance& at, double cos_theta, const Vec3d& along_theta,
                                const Vec3d& along_phi);
+VisibilityLine8 visibility_line(const SignedDistance8& at, Float8 cos_theta, const Vec8& along_theta,
+                                const Vec8& along_phi);
 
 }  // namespace heddle
 

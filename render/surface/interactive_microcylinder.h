@@ -15,6 +15,7 @@
 // has its lobes widened by that piece. Errors of both: docs/surface-models.md.
 // Shading is thread-safe. Tested in tests/render/surface/interactive_microcylinder_test.cpp.
 
+#include <array>
 #include <functional>
 #include <memory>
 #include <span>
@@ -51,9 +52,13 @@ class InteractiveMicrocylinder {
   void set_scattering(std::size_t thread, const ThreadParameters& parameters);
 
   /// Radiance towards wo (world, unit) of a point whose frame is world = frame * patch; lights in world space. Directional
-  /// lights are visible or not.
+  /// lights are visible or not. Eight terms at a time in single precision, without those that hold 1e-3 of the light together;
+  /// `printed` as shade_in_double().
   Rgbd shade(const Mat3d& frame, const Vec3d& wo, std::span<const Light> lights,
              const PointVisibility& visibility) const;
+  /// The same, all terms one after another in double.
+  Rgbd shade_in_double(const Mat3d& frame, const Vec3d& wo, std::span<const Light> lights,
+                       const PointVisibility& visibility) const;
 
   /// What shade() approximates, for one direction: R of microcylinder.h for these tangents and weights, patch frame.
   Rgbd reflected(const Vec3d& wi, const Vec3d& wo) const;
@@ -67,7 +72,10 @@ class InteractiveMicrocylinder {
   struct Around;
 
   void prepare();
+  static std::array<Lobe, 3> lobes_of(const ThreadScattering& scattering);
   double clipped(const Around& around, const PointVisibility& visibility) const;
+  Rgbd directional_light(const Mat3d& frame, const Vec3d& out, std::span<const Light> lights,
+                         const PointVisibility& visibility) const;
 
   MicrocylinderFabric fabric_;
   InteractiveSettings settings_;

@@ -66,6 +66,10 @@ GridPosition grid_position(const Vec3d& direction, int rows, int columns, double
           {(1 - down) * (1 - across), (1 - down) * across, down * (1 - across), down * across}};
 }
 
+std::size_t padded(int rank) {
+  return (static_cast<std::size_t>(rank) + kFloat8Lanes - 1) / kFloat8Lanes * kFloat8Lanes;
+}
+
 // One of the steps between tangents; the others are it times powers of 2.
 constexpr double kFinestStep = radians(4.5);
 
@@ -184,7 +188,7 @@ WeightingTable::WeightingTable(const MicrocylinderFabric& fabric, std::span<cons
   // Averages over Gaussians as matrices, (axis, incoming), one per finite sharpness.
   std::vector<Eigen::MatrixXf> averages(kLevels - 1, Eigen::MatrixXf(coarse, fine));
   tbb::parallel_for(0, kLevels - 1, [&](int level) {
-    const double sharpness = level == 0 ? 0 : kSharpnesses[static_cast<std::size_t>(level - 1)];
+    const double sharpness = level == 0 ? 0 : static_cast<double>(kSharpnesses[static_cast<std::size_t>(level - 1)]);
     Eigen::MatrixXf& average = averages[static_cast<std::size_t>(level)];
     for (Eigen::Index a = 0; a < coarse; ++a) {
       double nearest = -1;
@@ -204,6 +208,7 @@ WeightingTable::WeightingTable(const MicrocylinderFabric& fabric, std::span<cons
   });
 
   ranks_.resize(tangents.size());
+  stride_.resize(tangents.size());
   wo_.resize(tangents.size());
   axis_.resize(tangents.size());
   tbb::parallel_for(std::size_t{0}, tangents.size(), [&](std::size_t t) {
@@ -223,26 +228,29 @@ WeightingTable::WeightingTable(const MicrocylinderFabric& fabric, std::span<cons
     while (rank < seen && kept < settings.contribution * singular.sum()) kept += singular[rank++];
     rank = std::max<Eigen::Index>(rank, 1);
     ranks_[t] = static_cast<int>(rank);
+    stride_[t] = padded(ranks_[t]);
     using RowMajor = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-    const RowMajor right = solver.eigenvectors().rightCols(rank).rowwise().reverse().cast<float>();
+    RowMajor right = RowMajor::Zero(seen, static_cast<Eigen::Index>(stride_[t]));
+    right.leftCols(rank) = solver.eigenvectors().rightCols(rank).rowwise().reverse().cast<float>();
     const RowMajor left = stacked * right;
     wo_[t].assign(right.data(), right.data() + right.size());
     axis_[t].assign(left.data(), left.data() + left.size());
   });
   first_.push_back(0);
-  for (const int rank : ranks_) first_.push_back(first_.back() + static_cast<std::size_t>(rank));
+  for (const std::size_t stride : stride_) first_.push_back(first_.back() + stride);
 }
 
 WeightingTable::Outgoing WeightingTable::outgoing(const Vec3d& wo) const {
   const GridPosition position = grid_position(wo, wo_rows_, columns_, kLastPolar);
   Outgoing result(first_.back());
   for (std::size_t t = 0; t < ranks_.size(); ++t) {
-    const auto rank = static_cast<Eigen::Index>(ranks_[t]);
-    Eigen::Map<Eigen::VectorXf> sum(&result[first_[t]], rank);
-    sum.setZero();
     for (std::size_t k = 0; k < 4; ++k) {
-      const float* const values = &wo_[t][position.cell[k] * static_cast<std::size_t>(rank)];
-      sum += static_cast<float>(position.weight[k]) * Eigen::Map<const Eigen::VectorXf>(values, rank);
+      const float* const values = &wo_[t][position.cell[k] * stride_[t]];
+      const auto weight = static_cast<float>(position.weight[k]);
+      for (std::size_t j = 0; j < stride_[t]; j += kFloat8Lanes) {
+        float* const sum = &result[first_[t] + j];
+        store8(load8(sum) + weight * load8(values + j), sum);
+      }
     }
   }
   return result;
@@ -250,8 +258,8 @@ WeightingTable::Outgoing WeightingTable::outgoing(const Vec3d& wo) const {
 
 double WeightingTable::value(std::size_t tangent, const Outgoing& outgoing, const Vec3d& axis, double sharpness) const {
   // Position between levels: linear in sharpness up to the first, in its logarithm, and in 1 / sharpness beyond the last.
-  constexpr double kFirst = kSharpnesses.front();
-  constexpr double kLast = kSharpnesses.back();
+  constexpr double kFirst = static_cast<double>(kSharpnesses.front());
+  constexpr double kLast = static_cast<double>(kSharpnesses.back());
   double level = 0;
   if (sharpness < kFirst) {
     level = sharpness / kFirst;
@@ -263,7 +271,7 @@ double WeightingTable::value(std::size_t tangent, const Outgoing& outgoing, cons
   const int low = std::min(static_cast<int>(level), kLevels - 2);
   const double share = level - low;
   const GridPosition position = grid_position(axis, axis_rows_, columns_, kPi);
-  const auto rank = static_cast<Eigen::Index>(ranks_[tangent]);
+  const auto rank = static_cast<Eigen::Index>(stride_[tangent]);
   const Eigen::Map<const Eigen::VectorXf> right(&outgoing[first_[tangent]], rank);
   const auto cells = static_cast<std::size_t>(axis_rows_) * static_cast<std::size_t>(columns_);
   double sum = 0;
@@ -278,6 +286,58 @@ double WeightingTable::value(std::size_t tangent, const Outgoing& outgoing, cons
     }
   }
   return std::max(sum, 0.0);
+}
+
+Float8 WeightingTable::value(std::size_t tangent, const Outgoing& outgoing, const Vec8& axes, Float8 sharpness) const {
+  constexpr float kFirst = kSharpnesses.front();
+  constexpr float kLast = kSharpnesses.back();
+  const Float8 middle = 1 + 0.5F * log2_8(max8(sharpness, splat8(kFirst)) * (1 / kFirst));
+  const Float8 level = sharpness < kFirst  ? sharpness * (1 / kFirst)
+                       : sharpness < kLast ? middle
+                                           : kLevels - 1 - kLast / sharpness;
+  const Int8 low = __builtin_convertvector(min8(level, splat8(kLevels - 2)), Int8);
+  const Float8 of_high = level - __builtin_convertvector(low, Float8);
+
+  const Float8 polar = atan2_8(sqrt8(axes.x * axes.x + axes.y * axes.y), axes.z);
+  const Float8 row = polar * (static_cast<float>(axis_rows_ - 1) / kPif);
+  const Float8 turned = atan2_8(axes.y, axes.x) * (static_cast<float>(columns_) / (2 * kPif));
+  const Float8 column = turned < 0 ? turned + static_cast<float>(columns_) : turned;
+  const Int8 r = __builtin_convertvector(min8(row, splat8(static_cast<float>(axis_rows_ - 2))), Int8);
+  const Int8 c = __builtin_convertvector(column, Int8);
+  const Float8 down = row - __builtin_convertvector(r, Float8);
+  const Float8 across = column - __builtin_convertvector(c, Float8);
+
+  const std::size_t stride = stride_[tangent];
+  const float* const right = &outgoing[first_[tangent]];
+  Float8 values[kFloat8Lanes];
+  for (int k = 0; k < kFloat8Lanes; ++k) {
+    const int row_start = (low[k] * axis_rows_ + r[k]) * columns_;
+    const int left = c[k] % columns_;
+    const int next = (left + 1) % columns_;
+    const int level_step = axis_rows_ * columns_;
+    const float weights[4] = {(1 - down[k]) * (1 - across[k]), (1 - down[k]) * across[k], down[k] * (1 - across[k]),
+                              down[k] * across[k]};
+    const int cells[4] = {row_start + left, row_start + next, row_start + columns_ + left, row_start + columns_ + next};
+    const float* from[8];
+    float weight[8];
+    for (int n = 0; n < 8; ++n) {
+      from[n] = &axis_[tangent][static_cast<std::size_t>(cells[n & 3] + (n < 4 ? 0 : level_step)) * stride];
+      weight[n] = weights[n & 3] * (n < 4 ? 1 - of_high[k] : of_high[k]);
+    }
+    Float8 sum = {};
+    for (std::size_t j = 0; j < stride; j += kFloat8Lanes) {
+      Float8 cell = {};
+      for (int n = 0; n < 8; ++n) cell += weight[n] * load8(from[n] + j);
+      sum += cell * load8(right + j);
+    }
+    values[k] = sum;
+  }
+  Float8 result;
+  float sums[kFloat8Lanes];
+  sums8(values[0], values[1], values[2], values[3], sums);
+  sums8(values[4], values[5], values[6], values[7], sums + 4);
+  result = load8(sums);
+  return max8(result, Float8{});
 }
 
 void WeightingTable::write(const std::filesystem::path& path, const std::map<std::string, std::string>& metadata) const {
@@ -311,7 +371,7 @@ WeightingTable WeightingTable::read(const std::filesystem::path& path) {
   std::size_t whole = 0;
   for (const std::int32_t rank : ranks) {
     fits = fits && within(rank, 1, 1 << 24);
-    whole += static_cast<std::size_t>(std::max(rank, 0));
+    whole += padded(std::max(rank, 0));
   }
   const std::size_t wo_cells = fits ? static_cast<std::size_t>(grid[0]) * static_cast<std::size_t>(grid[2]) : 0;
   const std::size_t axis_cells = fits ? kLevels * static_cast<std::size_t>(grid[1]) * static_cast<std::size_t>(grid[2]) : 0;
@@ -326,13 +386,14 @@ WeightingTable WeightingTable::read(const std::filesystem::path& path) {
   auto from_axes = axes.begin();
   table.first_.push_back(0);
   for (const std::int32_t rank : ranks) {
-    const auto count = static_cast<std::size_t>(rank);
+    const std::size_t count = padded(rank);
     const auto take = [](auto& from, std::size_t size) {
       const auto begin = from;
       from += static_cast<std::ptrdiff_t>(size);
       return std::vector<float>(begin, from);
     };
     table.ranks_.push_back(rank);
+    table.stride_.push_back(count);
     table.first_.push_back(table.first_.back() + count);
     table.wo_.push_back(take(from_outgoing, wo_cells * count));
     table.axis_.push_back(take(from_axes, axis_cells * count));

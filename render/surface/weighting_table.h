@@ -21,6 +21,7 @@
 #include <string>
 #include <vector>
 
+#include "fibers/math/float8.h"
 #include "fibers/math/vector.h"
 #include "render/surface/microcylinder.h"
 
@@ -68,6 +69,8 @@ class WeightingTable {
 
   /// T of a tangent: axis on the whole sphere, sharpness from 0 up.
   double value(std::size_t tangent, const Outgoing& outgoing, const Vec3d& axis, double sharpness) const;
+  /// The same of eight axes, in single precision.
+  Float8 value(std::size_t tangent, const Outgoing& outgoing, const Vec8& axes, Float8 sharpness) const;
 
   std::size_t bytes() const;
   /// [tangent] singular values kept.
@@ -81,16 +84,17 @@ class WeightingTable {
   WeightingTable() = default;
 
   // Sharpness 0, four in steps of 4, and the limit of a direction.
-  static constexpr std::array<double, 4> kSharpnesses = {2, 8, 32, 128};
+  static constexpr std::array<float, 4> kSharpnesses = {2, 8, 32, 128};
   static constexpr int kLevels = 6;
 
   int columns_;
   int wo_rows_;
   int axis_rows_;
   std::vector<int> ranks_;
+  std::vector<std::size_t> stride_;       // [tangent] its rank, up to a multiple of 8: filled with 0
   std::vector<std::size_t> first_;        // [tangent + 1] offset in an Outgoing
-  std::vector<std::vector<float>> wo_;    // [tangent][row][column][rank]
-  std::vector<std::vector<float>> axis_;  // [tangent][level][row][column][rank]
+  std::vector<std::vector<float>> wo_;    // [tangent][row][column][stride]
+  std::vector<std::vector<float>> axis_;  // [tangent][level][row][column][stride]
 };
 
 }  // namespace heddle

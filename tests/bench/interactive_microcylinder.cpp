@@ -222,14 +222,16 @@ void compare_drape(const Options& options) {
   const std::vector<Rgbd> reference = traced(options.strata);
 
   double error_of_ours = 0;
-  for (const bool printed : {true, false}) {
-    settings.printed = printed;
+  enum class Form { kPrinted, kInDouble, kOurs };
+  for (const Form form : {Form::kPrinted, Form::kInDouble, Form::kOurs}) {
+    settings.printed = form == Form::kPrinted;
     start = Clock::now();
     const InteractiveMicrocylinder interactive(fabric, settings);
     const double build = seconds_since(start);
     const auto shaded_at = [&](std::uint32_t v) {
-      return interactive.shade(cloth.frames[v].cast<double>(), rasterizer.to_eye(v), lights,
-                               {&maps, maps.coefficients(v)});
+      const auto shade = form == Form::kOurs ? &InteractiveMicrocylinder::shade : &InteractiveMicrocylinder::shade_in_double;
+      return (interactive.*shade)(cloth.frames[v].cast<double>(), rasterizer.to_eye(v), lights,
+                                  {&maps, maps.coefficients(v)});
     };
     std::vector<Rgbd> at_probes;
     for (const std::uint32_t v : probes) at_probes.push_back(shaded_at(v));
@@ -245,10 +247,10 @@ void compare_drape(const Options& options) {
     const double per_frame = seconds_since(start) / kFrames;
     const double error = rms(at_probes, reference);
     fmt::print("{}: {} tangents, tables {:.2f} s, {:.2f} MB; error {:.4f}; {:.2f} frames/s ({} vertices, {} lights)\n",
-               printed ? "as printed" : "ours", interactive.tangents().size(), build,
+               form == Form::kPrinted ? "as printed" : (form == Form::kInDouble ? "ours, in double" : "ours"), interactive.tangents().size(), build,
                static_cast<double>(interactive.table().bytes()) / 1e6, error, 1 / per_frame, facing.size(),
                lights.size());
-    if (!printed) {
+    if (form == Form::kOurs) {
       error_of_ours = error;
       if (!options.out.empty()) {
         float brightest = 0;

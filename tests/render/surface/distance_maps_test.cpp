@@ -136,6 +136,42 @@ TEST(DistanceMapsLaw, LinesFollowTheBorder) {
   EXPECT_LT(visibility_line({-1, Vec3d::Zero()}, 1, Vec3d(1, 0, 0), Vec3d(0, 1, 0)).distance, -10);
 }
 
+TEST(DistanceMapsAgreement, EightAtATime) {
+  const Vec3 m = Vec3(0.6F, 0.3F, -0.4F).normalized();
+  const DistanceMaps maps = wall_map(m, Mat3::Identity());
+  const auto vector_of = [](const Vec8& v, int lane) {
+    return Vec3d(static_cast<double>(v.x[lane]), static_cast<double>(v.y[lane]), static_cast<double>(v.z[lane]));
+  };
+  RandomStream random(4, RandomStage::kTest, 0, 0);
+  for (int k = 0; k < 500; ++k) {
+    Vec8 directions;
+    for (int lane = 0; lane < 8; ++lane) {
+      const Vec3 w = lane == k % 8 ? Vec3(Vec3::Unit(k % 3) * (k % 2 == 0 ? 1 : -1)) : sample_sphere(random);
+      directions.x[lane] = w.x();
+      directions.y[lane] = w.y();
+      directions.z[lane] = w.z();
+    }
+    const SignedDistance8 eight = maps.evaluate(maps.coefficients(0), directions);
+    const Vec3d a(0.6, 0, 0.8);
+    const Vec3d b(0, 1, 0);
+    const auto lanes_of = [](const Vec3d& v) {
+      return Vec8{splat8(static_cast<float>(v.x())), splat8(static_cast<float>(v.y())),
+                  splat8(static_cast<float>(v.z()))};
+    };
+    const VisibilityLine8 lines = visibility_line(eight, splat8(0.5F), lanes_of(a), lanes_of(b));
+    for (int lane = 0; lane < 8; ++lane) {
+      const SignedDistance one = maps.evaluate(maps.coefficients(0), vector_of(directions, lane));
+      EXPECT_NEAR(static_cast<double>(eight.distance[lane]), one.distance, 1e-5);
+      if (std::abs(directions.x[lane]) > 0.999F) continue;  // the poles of the map have no gradient
+      EXPECT_LT((vector_of(eight.gradient, lane) - one.gradient).norm(), 2e-2);
+      const VisibilityLine line = visibility_line(one, 0.5, a, b);
+      if (std::hypot(one.gradient.dot(a), 0.5 * one.gradient.dot(b)) < 0.1) continue;
+      EXPECT_NEAR(static_cast<double>(lines.theta_gradient[lane]), line.theta_gradient, 0.1);
+      EXPECT_NEAR(static_cast<double>(lines.distance[lane]), line.distance, 0.1 * std::abs(line.distance) + 1e-3);
+    }
+  }
+}
+
 class DistanceMapsFormat : public FileFixture {};
 
 TEST_F(DistanceMapsFormat, ReadsWhatItWrote) {
