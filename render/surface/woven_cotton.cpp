@@ -50,6 +50,48 @@ WovenCotton::WovenCotton(WovenCottonParameters parameters)
     }
     half_range_.push_back(range);
   }
+  if (!parameters_.energy_safe) return;
+  for (CottonYarn& yarn : parameters_.yarns) {
+    yarn.diffuse *= kMostDiffuse / std::max(kPi * yarn.diffuse.maxCoeff(), kMostDiffuse);
+  }
+  energy_scale_ = make_energy_scale();
+}
+
+EnergyScale WovenCotton::make_energy_scale() const {
+  constexpr int kDraws = 1024;
+  const WovenPattern& pattern = parameters_.pattern;
+  Rgbd room = Rgbd::Ones();
+  for (const YarnSystem system : {YarnSystem::kWarp, YarnSystem::kWeft}) {
+    room -= kPi * pattern.coverage(system) * parameters_.yarns[static_cast<std::size_t>(system)].diffuse;
+  }
+  return EnergyScale([&](const Vec3d& wo) {
+    Rgbd sum = Rgbd::Zero();
+    for (int n = 0; n < kDraws; ++n) {
+      const Vec3d place = lattice_point(n);
+      const std::optional<Vec3d> wi = draw(place.x(), place.y(), place.z(), wo);
+      if (!wi || !(wi->z() > 0)) continue;
+      const Vec2d half = half_vector(*wi, wo);
+      Rgbd value = Rgbd::Zero();
+      for (std::size_t kind = 0; kind < pattern.kinds().size(); ++kind) {
+        const FloatKind& floats = pattern.kinds()[kind];
+        double area = 0;
+        for (int v = 0; v < variants_; ++v) {
+          const Rectangle whole = {Vec2d::Zero(), floats.size};
+          area += highlight_area(segments_[kind * static_cast<std::size_t>(variants_) + static_cast<std::size_t>(v)],
+                                 half, whole);
+        }
+        value += floats.share * area / (variants_ * floats.size.prod()) *
+                 parameters_.yarns[static_cast<std::size_t>(floats.system)].specular;
+      }
+      sum += value * highlight(*wi, wo) / density(*wi, wo);
+    }
+    return (sum / kDraws / room).maxCoeff();
+  });
+}
+
+double WovenCotton::highlight(const Vec3d& wi, const Vec3d& wo) const {
+  const double reflectance = highlight_reflectance(wi, wo, parameters_.ior);
+  return energy_scale_ ? reflectance * (*energy_scale_)(wi) * (*energy_scale_)(wo) : reflectance;
 }
 
 const WovenSegment& WovenCotton::segment_of(const PlacedFloat& placed) const {
@@ -95,7 +137,7 @@ Rgbd WovenCotton::reflected(const SurfacePoint& point, const Vec3d& wi, const Ve
   Rgbd sum = Rgbd::Zero();
   if (!(wi.z() > 0.0) || !(wo.z() > 0.0)) return sum;
   const Vec2d half = half_vector(wi, wo);
-  const double reflectance = highlight_reflectance(wi, wo, parameters_.ior);
+  const double reflectance = highlight(wi, wo);
   visit_pieces(point, [&](const Piece& piece) { sum += reflected_by(piece, half, wi.z(), reflectance); });
   return sum;
 }
@@ -106,7 +148,7 @@ Rgbd WovenCotton::reflected_sg(const SurfacePoint& point, const Vec3d& axis, dou
   visit_pieces(point, [&](const Piece& piece) { pieces.push_back(piece); });
   return integrate_sg_light(axis, sharpness, [&](const Vec3d& wi) {
     const Vec2d half = half_vector(wi, wo);
-    const double reflectance = highlight_reflectance(wi, wo, parameters_.ior);
+    const double reflectance = highlight(wi, wo);
     Rgbd sum = Rgbd::Zero();
     for (const Piece& piece : pieces) sum += reflected_by(piece, half, wi.z(), reflectance);
     return sum;
@@ -135,33 +177,35 @@ float WovenCotton::pdf(const SurfacePoint& /*point*/, const Vec3& wi, const Vec3
   return static_cast<float>(density(wi.cast<double>(), wo.cast<double>()));
 }
 
+/// The direction that three numbers in [0, 1) stand for; nothing where there is none.
+std::optional<Vec3d> WovenCotton::draw(double choice, double a, double b, const Vec3d& wo) const {
+  if (choice < kCosineShare) return cosine_direction(a, b);
+  choice = (choice - kCosineShare) / (1.0 - kCosineShare);
+  std::size_t kind = 0;
+  for (; kind + 1 < half_range_.size(); ++kind) {
+    choice -= parameters_.pattern.kinds()[kind].share;
+    if (choice < 0.0) break;
+  }
+  const Vec2d half = half_range_[kind].cwiseProduct(Vec2d(2.0 * a - 1.0, 2.0 * b - 1.0));
+  const double rest = 1.0 - half.squaredNorm();
+  if (rest <= 0.0) return std::nullopt;  // no such half vector
+  const Vec3d h(half.x(), half.y(), std::sqrt(rest));
+  if (h.dot(wo) <= 0.0) return std::nullopt;
+  return 2.0 * h.dot(wo) * h - wo;
+}
+
 std::optional<SurfaceSample> WovenCotton::sample(const SurfacePoint& point, const Vec3& wo,
                                                  RandomStream& random) const {
   const Vec3d out = wo.cast<double>();
-  Vec3d wi;
-  double choice = random.uniform_double();
+  const double choice = random.uniform_double();
   const double a = random.uniform_double();
   const double b = random.uniform_double();
-  if (choice < kCosineShare) {
-    wi = cosine_direction(a, b);
-  } else {
-    choice = (choice - kCosineShare) / (1.0 - kCosineShare);
-    std::size_t kind = 0;
-    for (; kind + 1 < half_range_.size(); ++kind) {
-      choice -= parameters_.pattern.kinds()[kind].share;
-      if (choice < 0.0) break;
-    }
-    const Vec2d half = half_range_[kind].cwiseProduct(Vec2d(2.0 * a - 1.0, 2.0 * b - 1.0));
-    const double rest = 1.0 - half.squaredNorm();
-    if (rest <= 0.0) return std::nullopt;  // no such half vector
-    const Vec3d h(half.x(), half.y(), std::sqrt(rest));
-    if (h.dot(out) <= 0.0) return std::nullopt;
-    wi = 2.0 * h.dot(out) * h - out;
-  }
-  const double probability = density(wi, out);
+  const std::optional<Vec3d> wi = draw(choice, a, b, out);
+  if (!wi) return std::nullopt;
+  const double probability = density(*wi, out);
   if (!(probability > 0.0)) return std::nullopt;
-  const Rgbd value = reflected(point, wi, out);
-  return SurfaceSample{wi.cast<float>(), (value / probability).cast<float>(), static_cast<float>(probability)};
+  const Rgbd value = reflected(point, *wi, out);
+  return SurfaceSample{wi->cast<float>(), (value / probability).cast<float>(), static_cast<float>(probability)};
 }
 
 WovenCottonParameters read_woven_cotton(const TomlTable& document) {
@@ -183,6 +227,7 @@ WovenCottonParameters read_woven_cotton(const TomlTable& document) {
       .pattern = read_woven_pattern(document.table("weave")),
       .yarns = {read_yarn("warp"), read_yarn("weft")},
       .irregularity = {},
+      .energy_safe = document.boolean("energy_safe", false),
   };
   if (const std::optional<TomlTable> table = document.optional_table("irregularity")) {
     WovenIrregularity irregularity;

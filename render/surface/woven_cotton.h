@@ -20,6 +20,7 @@
 #include <optional>
 #include <vector>
 
+#include "render/surface/energy_scale.h"
 #include "render/surface/surface_model.h"
 #include "render/surface/woven_pattern.h"
 #include "render/surface/woven_segment.h"
@@ -51,6 +52,9 @@ struct WovenCottonParameters {
   WovenPattern pattern;
   std::array<CottonYarn, 2> yarns;  // [YarnSystem]
   std::optional<WovenIrregularity> irregularity;
+  /// Less diffuse light where a yarn has more than 0.95, and highlights scaled by energy_scale.h for both directions. Then the
+  /// mean over the cloth returns no more than arrives, and everything stays reciprocal; points may still flash.
+  bool energy_safe = false;
 };
 
 class WovenCotton : public SurfaceModel {
@@ -78,7 +82,11 @@ class WovenCotton : public SurfaceModel {
     double weight;
   };
   void visit_pieces(const SurfacePoint& point, const std::function<void(const Piece&)>& visitor) const;
+  /// Of a highlight, with reflectance and geometry; 1 inside it.
+  double highlight(const Vec3d& wi, const Vec3d& wo) const;
   Rgbd reflected_by(const Piece& piece, const Vec2d& half, double cos_i, double reflectance) const;
+  std::optional<Vec3d> draw(double choice, double a, double b, const Vec3d& wo) const;
+  EnergyScale make_energy_scale() const;
   const WovenSegment& segment_of(const PlacedFloat& placed) const;
   double density(const Vec3d& wi, const Vec3d& wo) const;
 
@@ -86,6 +94,7 @@ class WovenCotton : public SurfaceModel {
   int variants_;                        // 1 or kVariants
   std::vector<WovenSegment> segments_;  // [kind][variant]
   std::vector<Vec2d> half_range_;       // [kind] the half vectors with a highlight: |x|, |y| at most
+  std::optional<EnergyScale> energy_scale_;
 };
 
 WovenCottonParameters read_woven_cotton(const TomlTable& document);

@@ -254,6 +254,41 @@ WovenYarns::WovenYarns(WovenYarnsParameters parameters) : parameters_(std::move(
     const double albedo = highlight_albedo();
     for (double& scale : highlight_scale_) scale = albedo > 0.0 ? scale / albedo : 0.0;
   }
+  if (!parameters_.energy_safe) return;
+  for (YarnMaterial& yarn : parameters_.yarns) {
+    yarn.diffuse *= kMostDiffuse / std::max(yarn.diffuse.maxCoeff(), kMostDiffuse);
+  }
+  energy_scale_ = make_energy_scale();
+}
+
+double WovenYarns::far_highlight(std::size_t kind, const Vec3d& wi, const Vec3d& wo) const {
+  const FloatKind& floats = parameters_.pattern.kinds()[kind];
+  const Rectangle whole = to_segment(floats, {Vec2d::Zero(), floats.size});
+  return floats.share / whole.area() * highlight_scale_[static_cast<std::size_t>(floats.system)] *
+         yarn_highlight_integral(segments_[kind], whole, to_segment(floats.system, wi), to_segment(floats.system, wo));
+}
+
+EnergyScale WovenYarns::make_energy_scale() const {
+  constexpr int kDraws = 512;
+  const WovenPattern& pattern = parameters_.pattern;
+  Rgbd room = Rgbd::Ones();
+  for (const YarnSystem system : {YarnSystem::kWarp, YarnSystem::kWeft}) {
+    room -= pattern.coverage(system) * parameters_.yarns[static_cast<std::size_t>(system)].diffuse;
+  }
+  return EnergyScale([&](const Vec3d& wo) {
+    Rgbd sum = Rgbd::Zero();
+    for (int n = 0; n < kDraws; ++n) {
+      const Vec3d place = lattice_point(n);
+      const std::optional<Vec3d> wi = draw(place.x(), place.y(), place.z(), wo);
+      if (!wi || !(wi->z() > 0) || !((*wi + wo).norm() > kShortestSum)) continue;
+      Rgbd value = Rgbd::Zero();
+      for (std::size_t kind = 0; kind < segments_.size(); ++kind) {
+        value += far_highlight(kind, *wi, wo) * segments_[kind].material.specular;
+      }
+      sum += value * wi->z() / density(*wi, wo);
+    }
+    return (sum / kDraws / room).maxCoeff();
+  });
 }
 
 double WovenYarns::highlight_albedo() const {
@@ -268,12 +303,7 @@ double WovenYarns::highlight_albedo() const {
     };
     const Vec3d wi = direction(coordinate(0.8566748838545029), coordinate(0.7338918566271260));
     const Vec3d wo = direction(coordinate(0.6287067210378087), coordinate(0.5385972572236101));
-    for (std::size_t k = 0; k < segments_.size(); ++k) {
-      const FloatKind& kind = parameters_.pattern.kinds()[k];
-      const Rectangle whole = to_segment(kind, {Vec2d::Zero(), kind.size});
-      sum += kind.share / whole.area() * highlight_scale_[static_cast<std::size_t>(kind.system)] *
-             yarn_highlight_integral(segments_[k], whole, to_segment(kind.system, wi), to_segment(kind.system, wo));
-    }
+    for (std::size_t k = 0; k < segments_.size(); ++k) sum += far_highlight(k, wi, wo);
   }
   return kPi * sum / kPairs;
 }
@@ -284,6 +314,7 @@ Rgbd WovenYarns::reflected(const SurfacePoint& point, const Vec3d& wi, const Vec
   if (!((wi + wo).norm() > kShortestSum)) return sum;
   const Vec2d position = point.position_mm.cast<double>() / parameters_.unit_mm;
   const double footprint = point.footprint_mm / parameters_.unit_mm;
+  const double safe = energy_scale_ ? (*energy_scale_)(wi) * (*energy_scale_)(wo) : 1;
   std::vector<std::optional<double>>
       of_whole;  // [kind] the mean over a segment that is seen whole: the same for all of a kind
   parameters_.pattern.visit_footprint(position, footprint, [&](const FootprintPart& seen) {
@@ -305,7 +336,7 @@ Rgbd WovenYarns::reflected(const SurfacePoint& point, const Vec3d& wi, const Vec
       highlight = *known;
     }
     const YarnMaterial& yarn = parameters_.yarns[system];
-    sum += seen.share * wi.z() * (yarn.diffuse / kPi + yarn.specular * (highlight * highlight_scale_[system]));
+    sum += seen.share * wi.z() * (yarn.diffuse / kPi + yarn.specular * (safe * highlight * highlight_scale_[system]));
   });
   return sum;
 }
@@ -337,28 +368,29 @@ float WovenYarns::pdf(const SurfacePoint& /*point*/, const Vec3& wi, const Vec3&
   return static_cast<float>(density(wi.cast<double>(), wo.cast<double>()));
 }
 
+/// The direction that three numbers in [0, 1) stand for; nothing where there is none.
+std::optional<Vec3d> WovenYarns::draw(double choice, double a, double b, const Vec3d& wo) const {
+  if (choice < kCosineShare) return cosine_direction(a, b);
+  const YarnSystem system = choice < kCosineShare + 0.5 * (1.0 - kCosineShare) ? YarnSystem::kWarp : YarnSystem::kWeft;
+  const double inclination = inclination_range_[static_cast<std::size_t>(system)] * (2.0 * a - 1.0);
+  const double x = 2.0 * b - 1.0;
+  const double rest = std::sqrt(1.0 - x * x);
+  const Vec3d h = to_cloth(system, {x, rest * std::sin(inclination), rest * std::cos(inclination)});
+  if (h.dot(wo) <= 0.0) return std::nullopt;
+  return 2.0 * h.dot(wo) * h - wo;
+}
+
 std::optional<SurfaceSample> WovenYarns::sample(const SurfacePoint& point, const Vec3& wo, RandomStream& random) const {
   const Vec3d out = wo.cast<double>();
-  Vec3d wi;
   const double choice = random.uniform_double();
   const double a = random.uniform_double();
   const double b = random.uniform_double();
-  if (choice < kCosineShare) {
-    wi = cosine_direction(a, b);
-  } else {
-    const YarnSystem system =
-        choice < kCosineShare + 0.5 * (1.0 - kCosineShare) ? YarnSystem::kWarp : YarnSystem::kWeft;
-    const double inclination = inclination_range_[static_cast<std::size_t>(system)] * (2.0 * a - 1.0);
-    const double x = 2.0 * b - 1.0;
-    const double rest = std::sqrt(1.0 - x * x);
-    const Vec3d h = to_cloth(system, {x, rest * std::sin(inclination), rest * std::cos(inclination)});
-    if (h.dot(out) <= 0.0) return std::nullopt;
-    wi = 2.0 * h.dot(out) * h - out;
-  }
-  const double probability = density(wi, out);
+  const std::optional<Vec3d> wi = draw(choice, a, b, out);
+  if (!wi) return std::nullopt;
+  const double probability = density(*wi, out);
   if (!(probability > 0.0)) return std::nullopt;
-  const Rgbd value = reflected(point, wi, out);
-  return SurfaceSample{wi.cast<float>(), (value / probability).cast<float>(), static_cast<float>(probability)};
+  const Rgbd value = reflected(point, *wi, out);
+  return SurfaceSample{wi->cast<float>(), (value / probability).cast<float>(), static_cast<float>(probability)};
 }
 
 WovenYarnsParameters read_woven_yarns(const TomlTable& document) {
@@ -381,6 +413,7 @@ WovenYarnsParameters read_woven_yarns(const TomlTable& document) {
       .pattern = read_woven_pattern(document.table("weave")),
       .yarns = {read_yarn("warp"), read_yarn("weft")},
       .specular_is_albedo = document.boolean("specular_is_albedo", false),
+      .energy_safe = document.boolean("energy_safe", false),
   };
   return parameters;
 }

@@ -17,6 +17,7 @@
 #include <array>
 #include <vector>
 
+#include "render/surface/energy_scale.h"
 #include "render/surface/surface_model.h"
 #include "render/surface/woven_pattern.h"
 
@@ -64,6 +65,8 @@ struct WovenYarnsParameters {
   /// Scales the highlights so that with k_s = 1 everywhere they return all light that comes evenly from the whole upper side,
   /// as LuxCore does: k_s up to 1 - k_d then keeps energy on that average (not for every single direction).
   bool specular_is_albedo = false;
+  /// As in WovenCottonParameters: for every single direction.
+  bool energy_safe = false;
 };
 
 /// Each system's highlight is divided by its coverage, so that the far value is the sum of the two systems' means.
@@ -84,11 +87,16 @@ class WovenYarns : public SurfaceModel {
  private:
   double density(const Vec3d& wi, const Vec3d& wo) const;
   double highlight_albedo() const;
+  /// Mean highlight of all segments of a kind, scaled.
+  double far_highlight(std::size_t kind, const Vec3d& wi, const Vec3d& wo) const;
+  std::optional<Vec3d> draw(double choice, double a, double b, const Vec3d& wo) const;
+  EnergyScale make_energy_scale() const;
 
   WovenYarnsParameters parameters_;
   std::vector<YarnSegment> segments_;        // [kind]
   std::array<double, 2> inclination_range_;  // [YarnSystem] of the half vectors that sample() draws
   std::array<double, 2> highlight_scale_;    // [YarnSystem]
+  std::optional<EnergyScale> energy_scale_;
 };
 
 WovenYarnsParameters read_woven_yarns(const TomlTable& document);
