@@ -92,7 +92,9 @@ fs::path cost_file(const Stage& stage, const Cache& cache) {
   return cache.artifact(stage.name, stage.key, ".cost.json");
 }
 
-fs::path chunk_cost_file(fs::path chunk) { return chunk.replace_extension(".cost.json"); }
+fs::path chunk_cost_file(fs::path chunk) {
+  return chunk.replace_extension(".cost.json");
+}
 
 std::string hash_of_geometry(const Exemplar& exemplar) {
   const auto bytes_of = [](const auto& values) { return content_hash(std::as_bytes(std::span(values))); };
@@ -254,8 +256,8 @@ const TileScene& FabricStages::scene() {
 
 const SegmentOrigins& FabricStages::origins() {
   if (!origins_) {
-    origins_ = find_segment_origins(scene(), document_.config.light_from_both_sides, origin_choice_,
-                                    document_.config.seed);
+    origins_ =
+        find_segment_origins(scene(), document_.config.light_from_both_sides, origin_choice_, document_.config.seed);
   }
   return *origins_;
 }
@@ -349,9 +351,8 @@ void FabricStages::run_shard(const Stage& stage, Work&& work) {
 
 // Maps do not depend on [visibility], which says how they are compressed.
 Stage FabricStages::maps_stage() {
-  std::vector<std::pair<std::string, std::string>> upstream = {{"geometry", geometry_key()},
-                                                               {"light_from", light_from()},
-                                                               {"seed", fmt::format("{}", document_.config.seed)}};
+  std::vector<std::pair<std::string, std::string>> upstream = {
+      {"geometry", geometry_key()}, {"light_from", light_from()}, {"seed", fmt::format("{}", document_.config.seed)}};
   append_origins(upstream);
   return make_stage("maps", 3, ".safetensors", "", std::move(upstream));
 }
@@ -400,8 +401,12 @@ Stage FabricStages::fit_stage(const std::string& name, int version) {
                     {{"maps", maps_stage().key}, {"seed", fmt::format("{}", document_.config.seed)}});
 }
 
-Stage FabricStages::ssdf_stage() { return fit_stage("ssdf", 1); }
-Stage FabricStages::sg_stage() { return fit_stage("sg", 1); }
+Stage FabricStages::ssdf_stage() {
+  return fit_stage("ssdf", 1);
+}
+Stage FabricStages::sg_stage() {
+  return fit_stage("sg", 1);
+}
 
 Artifact FabricStages::ssdf() {
   const Stage stage = ssdf_stage();
@@ -457,8 +462,8 @@ std::unique_ptr<FabricStages::TransferWork> FabricStages::transfer_work(const Tr
   for (const FiberScattering& scattering : exemplar().scattering) work->materials.emplace_back(scattering);
   work->settings = settings;
   const double mean_free_path = scene().mean_free_path(settings.seed, kMeanFreePathSamples);
-  work->cells = make_segment_cells(exemplar(), origins(),
-                                   static_cast<float>(settings.cell_mean_free_paths * mean_free_path));
+  work->cells =
+      make_segment_cells(exemplar(), origins(), static_cast<float>(settings.cell_mean_free_paths * mean_free_path));
   work->baker.emplace(scene(), work->materials, origins(), settings, work->cells);
   return work;
 }

@@ -72,7 +72,7 @@ struct StageResult {
   std::uint64_t chunks = 0;   // finished by this process
   std::uint64_t resumed = 0;  // chunks found finished
   WorkTime earlier = {};      // that other processes spent on the chunks found
-  double seconds = 0;  // of this stage alone
+  double seconds = 0;         // of this stage alone
 };
 
 /// What stages of several fabrics share during one command.

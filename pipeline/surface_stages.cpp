@@ -66,10 +66,10 @@ SurfaceStages::SurfaceStages(const SceneConfig& config, StageContext& context,
     surfaces_.emplace_back();
     if (cloth.surface_method != SurfaceMethod::kInteractive) continue;
     if (geometry.empty()) geometry = geometry_text(config, geometry_key);
-    surfaces_.back() = Surface{
-        &*cloth.surface,
-        make_stage("surface-weights", 1, ".safetensors", weights_text(*cloth.surface->interactive, {}), {}),
-        maps_stage(geometry, index, ClothSide::kFace), maps_stage(geometry, index, ClothSide::kBack)};
+    surfaces_.back() =
+        Surface{&*cloth.surface,
+                make_stage("surface-weights", 1, ".safetensors", weights_text(*cloth.surface->interactive, {}), {}),
+                maps_stage(geometry, index, ClothSide::kFace), maps_stage(geometry, index, ClothSide::kBack)};
   }
 }
 
@@ -120,8 +120,8 @@ std::vector<std::shared_ptr<const InteractiveSurface>> SurfaceStages::load(const
     const MicrocylinderFabric& fabric = *surface->fabric->interactive;
     auto& model = models[surface->fabric->text];
     if (!model) {
-      const Artifact table = provide_artifact(
-          surface->weights, surface->fabric->name, *context_, [&](const fs::path& path, StageResult&) {
+      const Artifact table =
+          provide_artifact(surface->weights, surface->fabric->name, *context_, [&](const fs::path& path, StageResult&) {
             const InteractiveSettings settings;
             WeightingTable(fabric, tangent_samples(fabric, settings.most_tangents), settings.weighting, settings.table)
                 .write(path, surface->weights.metadata);
@@ -129,8 +129,8 @@ std::vector<std::shared_ptr<const InteractiveSurface>> SurfaceStages::load(const
       model = std::make_shared<const InteractiveMicrocylinder>(fabric, InteractiveSettings{},
                                                                WeightingTable::read(table.path));
     }
-    loaded.back() = std::make_shared<const InteractiveSurface>(
-        model, maps(*surface, ClothSide::kFace, scene, cloth), maps(*surface, ClothSide::kBack, scene, cloth));
+    loaded.back() = std::make_shared<const InteractiveSurface>(model, maps(*surface, ClothSide::kFace, scene, cloth),
+                                                               maps(*surface, ClothSide::kBack, scene, cloth));
   }
   return loaded;
 }

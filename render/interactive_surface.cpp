@@ -16,7 +16,8 @@ DistanceMaps bake_distance_maps(const ClothScene& scene, const SurfaceCloth& sur
           [&](std::uint32_t v, const Vec3& direction) {
             return scene.globally_visible({surface.vertex_position(v), frames[v].col(2).cast<double>()}, direction);
           },
-          {}, vertex_done};
+          {},
+          vertex_done};
 }
 
 InteractiveSurface::InteractiveSurface(std::shared_ptr<const InteractiveMicrocylinder> model,

@@ -57,7 +57,8 @@ TriangleMesh SurfaceCloth::triangle_mesh() const {
 }
 
 Mat3d SurfaceCloth::vertex_frame(std::uint32_t vertex, ClothSide side) const {
-  return patch_frame(tangents_[vertex], side == ClothSide::kFace ? mesh_.normals[vertex] : Vec3d(-mesh_.normals[vertex]));
+  return patch_frame(tangents_[vertex],
+                     side == ClothSide::kFace ? mesh_.normals[vertex] : Vec3d(-mesh_.normals[vertex]));
 }
 
 SurfaceHit SurfaceCloth::hit(std::uint32_t triangle, double u, double v, const Vec3& ray_direction,

@@ -120,7 +120,8 @@ void DistanceMaps::write(const std::filesystem::path& path, const std::map<std::
 DistanceMaps DistanceMaps::read(const std::filesystem::path& path) {
   const TensorFile file = TensorFile::read(path);
   const std::vector<std::uint64_t> shape = file.shape("basis");
-  if (shape.size() != 3 || shape[0] != shape[1] || shape[0] < 4 || shape[0] > 4096 || shape[2] == 0 || shape[2] % 8 != 0) {
+  if (shape.size() != 3 || shape[0] != shape[1] || shape[0] < 4 || shape[0] > 4096 || shape[2] == 0 ||
+      shape[2] % 8 != 0) {
     throw FileError(path.string() + ": 'basis' is not [resolution][resolution][multiple of 8]");
   }
   DistanceMaps maps;

@@ -121,9 +121,10 @@ struct InteractiveMicrocylinder::Around {
 
 InteractiveMicrocylinder::InteractiveMicrocylinder(const MicrocylinderFabric& fabric,
                                                    const InteractiveSettings& settings)
-    : InteractiveMicrocylinder(fabric, settings,
-                               WeightingTable(fabric, tangent_samples(fabric, settings.most_tangents),
-                                              settings.weighting, settings.table)) {}
+    : InteractiveMicrocylinder(
+          fabric, settings,
+          WeightingTable(fabric, tangent_samples(fabric, settings.most_tangents), settings.weighting, settings.table)) {
+}
 
 InteractiveMicrocylinder::InteractiveMicrocylinder(const MicrocylinderFabric& fabric,
                                                    const InteractiveSettings& settings, WeightingTable table)
@@ -293,7 +294,17 @@ namespace {
 // Terms (lights times lobes) of one tangent that shade() computes eight at a time, one array for each quantity.
 struct Terms {
   static constexpr std::size_t kQuantities = 9;
-  enum Quantity : std::size_t { kSinTheta, kCosTheta, kThetaWidth, kSinPhi, kCosPhi, kPhiWidth, kFactor, kWeight, kKind };
+  enum Quantity : std::size_t {
+    kSinTheta,
+    kCosTheta,
+    kThetaWidth,
+    kSinPhi,
+    kCosPhi,
+    kPhiWidth,
+    kFactor,
+    kWeight,
+    kKind
+  };
 
   std::size_t size = 0;
   std::array<std::vector<float>, kQuantities> values;
@@ -402,8 +413,8 @@ Rgbd InteractiveMicrocylinder::shade(const Mat3d& frame, const Vec3d& wo, std::s
     const auto cos_o = static_cast<float>(std::sqrt(std::max(0.0, 1 - o.x() * o.x())));
     const Mat3 to_thread = tangent.frame.transpose().cast<float>();
     const auto albedo = static_cast<float>(tangent.scattering.parameters().albedo.maxCoeff());
-    const auto share = static_cast<float>(fabric_.threads[static_cast<std::size_t>(tangent.thread)].share *
-                                          samples_[t].share);
+    const auto share =
+        static_cast<float>(fabric_.threads[static_cast<std::size_t>(tangent.thread)].share * samples_[t].share);
     for (std::size_t first = 0; first < padded; first += kFloat8Lanes) {
       const Vec8 axis = {load8(&gaussians.x[first]), load8(&gaussians.y[first]), load8(&gaussians.z[first])};
       const Float8 w_k = load8(&gaussians.half_sharpness[first]);
@@ -547,9 +558,9 @@ Rgbd InteractiveMicrocylinder::shade(const Mat3d& frame, const Vec3d& wo, std::s
         Float8 sum = {};
         for (std::size_t k = 0; k < kSide; ++k) {
           const Float8 reflected = reflectance8(ior, max8(cos_theta_d * cos_half_phi_d[k], Float8{}));
-          const Float8 entering =
-              half_angle ? (1 - reflected) * (1 - reflected)
-                         : leaving * (1 - reflectance8(ior, max8(cosine * cosine_phi[k], Float8{})));
+          const Float8 entering = half_angle
+                                      ? (1 - reflected) * (1 - reflected)
+                                      : leaving * (1 - reflectance8(ior, max8(cosine * cosine_phi[k], Float8{})));
           sum += phi_nodes.weight[k] * (surface ? reflected * cos_half_phi_d[k] : entering);
         }
         smooth += along * sum;

@@ -45,7 +45,8 @@ class InteractiveMicrocylinder {
  public:
   InteractiveMicrocylinder(const MicrocylinderFabric& fabric, const InteractiveSettings& settings);
   /// With the table that was built for tangent_samples() of this fabric.
-  InteractiveMicrocylinder(const MicrocylinderFabric& fabric, const InteractiveSettings& settings, WeightingTable table);
+  InteractiveMicrocylinder(const MicrocylinderFabric& fabric, const InteractiveSettings& settings,
+                           WeightingTable table);
   ~InteractiveMicrocylinder();
 
   /// Changes a thread's scattering. Tangents stay where they are.

@@ -41,7 +41,8 @@ class SurfaceModel {
   virtual Rgbd reflected_sg(const SurfacePoint& point, const Vec3d& axis, double sharpness, const Vec3d& wo) const = 0;
 
   /// Draws wi for a given wo with wo.z > 0; nothing where the draw falls below the surface or the density is 0.
-  virtual std::optional<SurfaceSample> sample(const SurfacePoint& point, const Vec3& wo, RandomStream& random) const = 0;
+  virtual std::optional<SurfaceSample> sample(const SurfacePoint& point, const Vec3& wo,
+                                              RandomStream& random) const = 0;
 
   /// Density (1/sr) with which sample() draws wi.
   virtual float pdf(const SurfacePoint& point, const Vec3& wi, const Vec3& wo) const = 0;

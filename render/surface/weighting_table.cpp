@@ -340,7 +340,8 @@ Float8 WeightingTable::value(std::size_t tangent, const Outgoing& outgoing, cons
   return max8(result, Float8{});
 }
 
-void WeightingTable::write(const std::filesystem::path& path, const std::map<std::string, std::string>& metadata) const {
+void WeightingTable::write(const std::filesystem::path& path,
+                           const std::map<std::string, std::string>& metadata) const {
   const auto joined = [](const std::vector<std::vector<float>>& parts) {
     std::vector<float> all;
     for (const std::vector<float>& part : parts) all.insert(all.end(), part.begin(), part.end());
@@ -374,7 +375,8 @@ WeightingTable WeightingTable::read(const std::filesystem::path& path) {
     whole += padded(std::max(rank, 0));
   }
   const std::size_t wo_cells = fits ? static_cast<std::size_t>(grid[0]) * static_cast<std::size_t>(grid[2]) : 0;
-  const std::size_t axis_cells = fits ? kLevels * static_cast<std::size_t>(grid[1]) * static_cast<std::size_t>(grid[2]) : 0;
+  const std::size_t axis_cells =
+      fits ? kLevels * static_cast<std::size_t>(grid[1]) * static_cast<std::size_t>(grid[2]) : 0;
   if (!fits || outgoing.size() != wo_cells * whole || axes.size() != axis_cells * whole) {
     throw FileError(path.string() + ": not the sizes of a table of weights");
   }

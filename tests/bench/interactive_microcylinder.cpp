@@ -229,7 +229,8 @@ void compare_drape(const Options& options) {
     const InteractiveMicrocylinder interactive(fabric, settings);
     const double build = seconds_since(start);
     const auto shaded_at = [&](std::uint32_t v) {
-      const auto shade = form == Form::kOurs ? &InteractiveMicrocylinder::shade : &InteractiveMicrocylinder::shade_in_double;
+      const auto shade =
+          form == Form::kOurs ? &InteractiveMicrocylinder::shade : &InteractiveMicrocylinder::shade_in_double;
       return (interactive.*shade)(cloth.frames[v].cast<double>(), rasterizer.to_eye(v), lights,
                                   {&maps, maps.coefficients(v)});
     };
@@ -247,9 +248,9 @@ void compare_drape(const Options& options) {
     const double per_frame = seconds_since(start) / kFrames;
     const double error = rms(at_probes, reference);
     fmt::print("{}: {} tangents, tables {:.2f} s, {:.2f} MB; error {:.4f}; {:.2f} frames/s ({} vertices, {} lights)\n",
-               form == Form::kPrinted ? "as printed" : (form == Form::kInDouble ? "ours, in double" : "ours"), interactive.tangents().size(), build,
-               static_cast<double>(interactive.table().bytes()) / 1e6, error, 1 / per_frame, facing.size(),
-               lights.size());
+               form == Form::kPrinted ? "as printed" : (form == Form::kInDouble ? "ours, in double" : "ours"),
+               interactive.tangents().size(), build, static_cast<double>(interactive.table().bytes()) / 1e6, error,
+               1 / per_frame, facing.size(), lights.size());
     if (form == Form::kOurs) {
       error_of_ours = error;
       if (!options.out.empty()) {

@@ -33,16 +33,27 @@ TEST(Float8, FunctionsAgainstDoubles) {
   const auto exponential = [](double x) { return std::exp(x); };
   EXPECT_LT(largest_error(exp8, exponential, -86.9, 87.9, true), 3e-7);
   EXPECT_LT(largest_error(exp8, exponential, -1, 1, true), 3e-7);
-  EXPECT_LT(largest_error(log2_8, [](double x) { return std::log2(x); }, 1e-3, 1e3), 2e-6);
-  EXPECT_LT(largest_error(sine8, [](double x) { return std::sin(x); }, -0.75 * kPi, 0.75 * kPi), 6e-7);
-  EXPECT_LT(largest_error(cosine8, [](double x) { return std::cos(x); }, -1.5 * kPi, 1.5 * kPi), 2e-6);
-  EXPECT_LT(largest_error(sqrt8, [](double x) { return std::sqrt(x); }, 0, 10), 3e-7);
+  EXPECT_LT(largest_error(
+                log2_8, [](double x) { return std::log2(x); }, 1e-3, 1e3),
+            2e-6);
+  EXPECT_LT(largest_error(
+                sine8, [](double x) { return std::sin(x); }, -0.75 * kPi, 0.75 * kPi),
+            6e-7);
+  EXPECT_LT(largest_error(
+                cosine8, [](double x) { return std::cos(x); }, -1.5 * kPi, 1.5 * kPi),
+            2e-6);
+  EXPECT_LT(largest_error(
+                sqrt8, [](double x) { return std::sqrt(x); }, 0, 10),
+            3e-7);
   for (const double scale : {1e-20, 1.0, 1e10}) {
     const auto y_of = [&](Float8 angle) {
       return atan2_8(static_cast<float>(scale) * sine8(0.5F * angle) * cosine8(0.5F * angle) * 2,
                      static_cast<float>(scale) * cosine8(angle));
     };
-    EXPECT_LT(largest_error(y_of, [](double x) { return x; }, -0.999 * kPi, 0.999 * kPi), 2e-6) << scale;
+    EXPECT_LT(largest_error(
+                  y_of, [](double x) { return x; }, -0.999 * kPi, 0.999 * kPi),
+              2e-6)
+        << scale;
   }
 }
 

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -332,6 +333,77 @@ TEST(SurfacesEndToEnd, SurfacesAloneNeedNoStagesAndAnEditedOneMakesANewPicture) 
   EXPECT_EQ(shop.report({"info", "alone.toml"}).at("fabrics").at(0), "own.toml");
 }
 
+// A strip of 1 mm hangs 1 mm over a square of 4 mm, light comes at 45 degrees: its shadow lies on x from -1.5 to -0.5.
+TEST(SurfacesEndToEnd, StackedClothsShadowEachOther) {
+  const Workshop shop;
+  std::ofstream(shop / "strip.obj") << "v -0.5 -2 1\nv 0.5 -2 1\nv 0.5 2 1\nv -0.5 2 1\n"
+                                       "vt -0.5 -2\nvt 0.5 -2\nvt 0.5 2\nvt -0.5 2\nf 1/1 2/2 3/3 4/4\n";
+  const std::string start = R"(name = "stack"
+[camera]
+position_mm = [0, 0, 8]
+look_at_mm = [0, 0, 0]
+up = [0, 1, 0]
+fov_deg = 30.75
+fov_axis = "vertical"
+resolution_px = [16, 16]
+[[light]]
+type = "directional"
+direction = [1, 0, 1]
+irradiance = [3, 3, 3]
+[render]
+spp = 16
+)";
+  const std::string strip = "[[cloth]]\nmesh = \"strip.obj\"\nmesh_unit = \"mm\"\nuv_size_mm = 1\n";
+  const std::string square = "[[cloth]]\nflat_mm = [4, 4]\n";
+  const std::string fibers = "fabric = \"fabric.toml\"\n";
+  const std::string linen = "surface = \"linen-plain\"\n";
+  const std::string interactive = linen + "surface_method = \"interactive\"\n";
+  const std::map<std::string, std::string> scenes = {
+      {"fibers-over-surface.toml", strip + fibers + square + linen},
+      {"fibers-over-interactive.toml", strip + fibers + square + interactive},
+      {"surface-over-fibers.toml", strip + linen + square + fibers},
+      {"interactive-over-fibers.toml", strip + interactive + square + fibers},
+      {"surface-over-surface.toml", strip + linen + square + interactive}};
+  for (const auto& [name, cloths] : scenes) {
+    std::ofstream(shop / name) << start + cloths;
+    for (const char* method : {"exact", "volume", "path"}) {
+      const ProgramResult result = shop.run({"render", name, "-o", "stack.exr", "--method", method});
+      ASSERT_EQ(result.status, 0) << name << ": " << result.error;
+      const Image image = read_exr(shop / "stack.exr");
+      // Light scattered once, mean over two columns and four rows of the middle. (Multiple scattering blurs the edge of a shadow.)
+      const auto green = [&](int column) {
+        float sum = 0;
+        for (int row = 6; row < 10; ++row) {
+          for (int c = column; c < column + 2; ++c)
+            sum += image.channels.at("single.G").values[static_cast<std::size_t>(row * 16 + c)];
+        }
+        return sum / 8;
+      };
+      // 0.28 mm per pixel: columns from -1.4 to -0.8, and from 1.1 to 1.65; the strip covers 6 to 9.
+      const float shadow = green(3);
+      const float lit = green(12);
+      const float top = green(7);
+      EXPECT_GT(lit, 0.001F) << name << " " << method;
+      EXPECT_GT(top, 0.002F) << name << " " << method << ": the strip itself";
+      EXPECT_LT(shadow, 0.1F * lit) << name << " " << method;
+      if (std::string(method) == "path") continue;
+      // Every layer of a surface's pixels says something, or that there is nothing to say.
+      const bool surface_below = name.find("over-fibers") == std::string::npos;
+      const std::size_t pixel = 8 * 16 + 13;
+      EXPECT_EQ(image.channels.at("segment").ids[pixel] == 0xffffffffU, surface_below) << name;
+      EXPECT_EQ(image.channels.at("cell").ids[pixel] == 0xffffffffU, surface_below) << name;
+      EXPECT_NEAR(image.channels.at("Z").values[pixel], 8, 0.3) << name;
+      EXPECT_NEAR(image.channels.at("u").values[pixel], (13.5 - 8) * 0.275, 0.3) << name;
+      EXPECT_GT(image.channels.at("A").values[pixel], surface_below ? 0.999 : 0.5) << name;
+      const auto tangent = [&](const char* axis) {
+        return image.channels.at(std::string("tangent.") + axis).values[pixel];
+      };
+      EXPECT_NEAR(std::hypot(tangent("X"), tangent("Y"), tangent("Z")), 1, 1e-4) << name;
+      EXPECT_EQ(image.channels.at("multiple.G").values[pixel] == 0, surface_below) << name;
+    }
+  }
+}
+
 TEST(SurfacesEndToEnd, ThreadsLightsAndCamerasAreEditedWithoutPrecomputingAgain) {
   const Workshop shop;
   const std::string threads = text_of(fs::path(HEDDLE_SOURCE_DIR) / "configs/fabrics/linen-plain.toml");
@@ -356,8 +428,10 @@ TEST(SurfacesEndToEnd, ThreadsLightsAndCamerasAreEditedWithoutPrecomputingAgain)
   EXPECT_EQ(built("pictures.again"), Stages{});
 
   std::string other = threads;
-  for (const auto& [from, to] : {std::pair{"ior = 1.46", "ior = 1.6"}, {"kd = 0.3", "kd = 0.5"},
-                                 {"gamma_s_deg = 12", "gamma_s_deg = 9"}, {"gamma_v_deg = 24", "gamma_v_deg = 40"},
+  for (const auto& [from, to] : {std::pair{"ior = 1.46", "ior = 1.6"},
+                                 {"kd = 0.3", "kd = 0.5"},
+                                 {"gamma_s_deg = 12", "gamma_s_deg = 9"},
+                                 {"gamma_v_deg = 24", "gamma_v_deg = 40"},
                                  {"albedo = [0.06, 0.24, 0.3]", "albedo = [0.3, 0.2, 0.1]"}}) {
     other = edited(other.c_str(), from, to);
   }

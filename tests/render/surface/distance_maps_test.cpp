@@ -189,7 +189,8 @@ TEST_F(DistanceMapsFormat, ReadsWhatItWrote) {
 }
 
 TEST_F(DistanceMapsFormat, SizesThatDoNotFitAreNamed) {
-  const auto message = [&](std::uint64_t rows, std::uint64_t columns, std::uint64_t stride, std::uint64_t other_stride) {
+  const auto message = [&](std::uint64_t rows, std::uint64_t columns, std::uint64_t stride,
+                           std::uint64_t other_stride) {
     TensorFileWriter file;
     file.add<float>("basis", {rows, columns, stride}, std::vector<float>(rows * columns * stride));
     file.add<float>("coefficients", {2, other_stride}, std::vector<float>(2 * other_stride));

@@ -114,7 +114,8 @@ TEST(EnergyScaleLaw, ReciprocityStays) {
       RandomStream random(3, RandomStage::kTest, static_cast<std::uint64_t>(k), 0);
       const Vec3d wi = direction_of(k, random).cast<double>().normalized();
       const Vec3d wo = direction_of(k + 1, random).cast<double>().normalized();
-      const SurfacePoint point = {Vec2(random.uniform(), random.uniform()), k % 3 == 0 ? 0 : (k % 3 == 1 ? 0.3F : 1000)};
+      const SurfacePoint point = {Vec2(random.uniform(), random.uniform()),
+                                  k % 3 == 0 ? 0 : (k % 3 == 1 ? 0.3F : 1000)};
       const Rgbd there = safe_form(f).reflected(point, wi, wo) / wi.z();
       const Rgbd back = safe_form(f).reflected(point, wo, wi) / wo.z();
       EXPECT_LT((there - back).abs().maxCoeff(), 1e-9 * there.maxCoeff()) << kViolating[f].preset;
