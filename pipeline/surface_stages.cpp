@@ -68,7 +68,7 @@ SurfaceStages::SurfaceStages(const SceneConfig& config, StageContext& context,
     if (geometry.empty()) geometry = geometry_text(config, geometry_key);
     surfaces_.back() =
         Surface{&*cloth.surface,
-                make_stage("surface-weights", 1, ".safetensors", weights_text(*cloth.surface->interactive, {}), {}),
+                make_stage("surface-weights", 2, ".safetensors", weights_text(*cloth.surface->interactive, {}), {}),
                 maps_stage(geometry, index, ClothSide::kFace), maps_stage(geometry, index, ClothSide::kBack)};
   }
 }
