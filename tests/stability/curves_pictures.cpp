@@ -108,7 +108,7 @@ Curve cells_curve(Effort effort) {
   const int spp = effort == Effort::kFull ? 256 : 128;
   const PictureResult truth = pipeline.picture(scene, RenderMethod::kPath, spp);
   for (const double factor : factors) {
-    const SceneVariant variant{.order = {}, .fabric = {.cell_size = factor}, .blend = {}};
+    const SceneVariant variant{.order = {}, .fabric = {.cell_size = factor}, .blend = {}, .surface_method = {}};
     const PictureResult fast = pipeline.picture(scene, RenderMethod::kExact, spp, true, variant);
     const FabricPack pack = pipeline.pack(variant.fabric);
     curve.drivers.push_back(pack_facts(pack, TileScene(pack.exemplar)).cell_mean_free_paths);

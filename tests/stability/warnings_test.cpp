@@ -201,7 +201,7 @@ TEST(PictureWarningsStability, SharpnessOfLights) {
   scene.cloth = "flat_mm = [40, 40]\nunderlay = true\n";
   const auto warned = [&](Pictures& pictures, double sharpness, RenderMethod method, const VisibilityBlend& blend) {
     scene.light = gaussian({0.3, 0.2, 1}, sharpness);
-    return pictures.warned(scene, method, 2, {.order = {}, .fabric = {}, .blend = blend});
+    return pictures.warned(scene, method, 2, {.order = {}, .fabric = {}, .blend = blend, .surface_method = {}});
   };
   for (const double sharpness : {3.0, 40.0, 99.0, 150.0, 300.0, 1e5}) {
     const bool sharp = sharpness > kLobesSharpness;
