@@ -75,7 +75,10 @@ class ChartMaker {
     const std::vector<ChartRun> runs =
         chart_runs(job_->config(), base_, {.quick = options_->quick, .spp = options_->quick ? 4 : 64});
     for (const ReferenceKind kind : kReferenceKinds) make_reference(kind);
+    const std::vector<std::string>& wanted = options_->methods;
     for (const ChartRun& run : runs) {
+      const char* method = render_method_name(run.request.method);
+      if (!wanted.empty() && std::find(wanted.begin(), wanted.end(), method) == wanted.end()) continue;
       stop_if_interrupted();
       chart_.rows.push_back(make_row(run));
       say(chart_.rows.back());

@@ -17,6 +17,7 @@
 #include "formats/obj_mesh.h"
 #include "formats/tensor_file.h"
 #include "pipeline/commands.h"
+#include "pipeline/plan/accuracy_table.h"
 #include "pipeline/stages.h"
 #include "render/scene_config.h"
 
@@ -234,7 +235,7 @@ Report describe(const fs::path& path, const CommonOptions& common) {
   if (extension == ".vdb") return describe_vdb(path);
   if (extension == ".exr") return describe_image(path);
   if (extension == ".obj") return describe_mesh(path);
-  throw FileError(path.string() + ": expected a pack, or a file that ends in .toml, .safetensors, .vdb, .exr or .obj");
+  throw FileError(path.string() + ": expected a pack, or a file that ends in .toml, .safetensors, .vdb, .exr or .obj, or the .json of an accuracy table");
 }
 
 void print_text(const Report& report) {
@@ -251,6 +252,11 @@ void print_text(const Report& report) {
 }  // namespace
 
 int info_command(const fs::path& path, const CommonOptions& common) {
+  if (path.extension() == ".json" && path.filename() != kManifestName && fs::exists(path)) {
+    const AccuracyTable table = read_accuracy(path);
+    std::cout << (common.json ? accuracy_json(table).dump(2) + "\n" : accuracy_text(table));
+    return 0;
+  }
   const Report report = describe(path, common);
   if (common.json) {
     std::cout << report.dump(2) << '\n';

@@ -1,12 +1,16 @@
 #include <fmt/format.h>
 
+#include <cmath>
 #include <map>
+#include <optional>
 
 #include "formats/input_error.h"
 #include "pipeline/commands.h"
 #include "pipeline/job.h"
 #include "pipeline/picture_request.h"
+#include "pipeline/plan/scene_plan.h"
 #include "pipeline/scene_job.h"
+#include "render/render_output.h"
 
 namespace heddle {
 namespace {
@@ -32,19 +36,80 @@ void apply_overrides(const RenderOptions& options, PictureRequest& request) {
   request.estimator = estimators.at(options.estimator);
 }
 
+void write_picture(const PictureResult& picture, const std::filesystem::path& output, Job& job) {
+  make_folder(output.parent_path());
+  write_exr(output, picture.image);
+  write_picture_report(output, picture);
+  job.add_artifact(output);
+}
+
+/// Noise that the picture itself shows: root of the mean over pixels and channels of the variance, over the mean.
+std::optional<double> relative_noise_of(const Image& image) {
+  if (!image.channels.contains("Variance.R")) return {};
+  const auto mean_of = [&image](const std::string& layer) {
+    double sum = 0;
+    for (const Rgb& color : layer_of(image, layer, "picture")) sum += static_cast<double>(color.mean());
+    return sum / (static_cast<double>(image.width) * image.height);
+  };
+  const double mean = mean_of("");
+  if (!(mean > 0)) return {};
+  return std::sqrt(mean_of("Variance")) / mean;
+}
+
+/// The cheapest picture that is good enough.
+int render_within(double tolerance, const RenderOptions& options, Job& job) {
+  const bool by_hand = !options.method.empty() || options.spp || options.seconds || options.local || options.bounces ||
+                       options.order || !options.estimator.empty();
+  if (by_hand) {
+    throw ConfigError("--tolerance chooses method, samples and data: not together with --method, --spp, --seconds, --local, "
+                      "--bounces, --estimator or --order");
+  }
+  const ScenePlan plan = make_plan({.scene = options.scene,
+                                    .view = options.view,
+                                    .crop = options.crop,
+                                    .tolerance = tolerance,
+                                    .pictures = options.pictures,
+                                    .may_build = true},
+                                   job.context());
+  if (!plan.chosen) {
+    job.console().warn(plan_text(plan) + "nothing rendered");
+    return 1;
+  }
+  job.console().say(plan_text(plan));
+  const Way& way = plan.ways[*plan.chosen];
+  SceneJob scene(options.scene, job.context(), way.variant);
+  PictureResult picture = scene.render(plan.request, "render");
+  const double bias_square = std::max(0.0, way.candidate.bias_square.value);
+  const double noise = relative_noise_of(picture.image)
+                           .value_or(std::sqrt(std::max(0.0, way.candidate.noise_square.value) / plan.offer->spp));
+  const double error = std::sqrt(bias_square + noise * noise);
+  const std::string done = fmt::format("{}, {} spp in {:.3g} s: expected error {:.3g} %, of that noise {:.3g} %, as the picture shows",
+                                       way.candidate.name, plan.offer->spp, picture.report.at("seconds").get<double>(),
+                                       100 * error, 100 * noise);
+  if (error > tolerance) {
+    job.console().warn(done + fmt::format("; more than the {:.3g} % asked for", 100 * tolerance));
+  } else {
+    job.console().say(done);
+  }
+  picture.report["plan"] = plan_json(plan);
+  picture.report["expected_error"] = error;
+  write_picture(picture, options.output, job);
+  job.add_entry("plan", plan_json(plan));
+  job.add_entry("expected_error", error);
+  job.finish();
+  return 0;
+}
+
 }  // namespace
 
 int render_command(const RenderOptions& options, const CommonOptions& common) {
   if (options.output.extension() != ".exr") throw ConfigError("-o: expected a file name that ends in .exr");
   Job job(common);
+  if (options.tolerance) return render_within(*options.tolerance, options, job);
   SceneJob scene(options.scene, job.context(), {.order = options.order, .fabric = {}, .blend = {}, .surface_method = {}});
   PictureRequest request = scene.request(find_view(scene.config(), options.view));
   apply_overrides(options, request);
-  const PictureResult picture = scene.render(request, "render");
-  make_folder(options.output.parent_path());
-  write_exr(options.output, picture.image);
-  write_picture_report(options.output, picture);
-  job.add_artifact(options.output);
+  write_picture(scene.render(request, "render"), options.output, job);
   job.finish();
   return 0;
 }

@@ -47,6 +47,9 @@ int stage_command(const StageOptions& options, const CommonOptions& common) {
         artifact = stages.transfer(options.order);
       }
       break;
+    case StageTarget::kAccuracy:
+      artifact = stages.accuracy();
+      break;
     case StageTarget::kPack: {
       Needs needs = kEverything;
       needs.order = options.order;

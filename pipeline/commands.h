@@ -21,7 +21,7 @@ struct CommonOptions {
   bool json = false;  // a report for programs on standard output
 };
 
-enum class StageTarget { kSynth, kVisibility, kTransfer, kPack };
+enum class StageTarget { kSynth, kVisibility, kTransfer, kPack, kAccuracy };
 
 struct StageOptions {
   std::filesystem::path fabric;
@@ -54,8 +54,22 @@ struct RenderOptions {
   std::optional<int> bounces;
   std::string estimator;  // "mis" where empty
   std::optional<int> order;
+  std::optional<double> tolerance;  // method, samples and data by a plan
+  int pictures = 1;                 // that the plan reckons with
 };
+/// Status 1 where no way meets the tolerance; then nothing is rendered.
 int render_command(const RenderOptions& options, const CommonOptions& common);
+
+struct PlanOptions {
+  std::filesystem::path scene;
+  std::string view;
+  std::vector<int> crop;
+  double tolerance = 0;  // relative RMSE
+  int pictures = 1;
+};
+/// Prints what would be built and used, what it costs and why (docs/plan.md). Builds accuracy tables where they are missing and
+/// path tracing is not cheaper than that. Status 1 where no way meets the tolerance.
+int plan_command(const PlanOptions& options, const CommonOptions& common);
 
 struct CompareOptions {
   std::filesystem::path a;
@@ -75,6 +89,7 @@ struct ChartOptions {
   std::optional<int> width;      // px; 96 or less where neither is given, the other by the view's shape
   std::optional<int> height;
   std::vector<int> crop;  // x0, y0, x1, y1, or empty; of the view's own frame where no width or height is given
+  std::vector<std::string> methods;  // of the runs; all where empty
   int reference_spp = 1024;
   bool quick = false;
   bool resume = false;

@@ -32,7 +32,8 @@ void Job::finish() const {
   auto artifacts = nlohmann::ordered_json::array();
   for (const std::filesystem::path& path : artifacts_) artifacts.push_back(path.string());
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
-  const nlohmann::ordered_json report = {{"stages", stages}, {"artifacts", artifacts}, {"seconds", seconds}};
+  nlohmann::ordered_json report = {{"stages", stages}, {"artifacts", artifacts}, {"seconds", seconds}};
+  for (const auto& [name, value] : entries_) report[name] = value;
   std::cout << report.dump(2) << '\n';
 }
 

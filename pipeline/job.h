@@ -5,7 +5,9 @@
 
 #include <chrono>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "pipeline/commands.h"
@@ -21,6 +23,8 @@ class Job {
   Console& console() { return console_; }
   StageContext& context() { return context_; }
   void add_artifact(const std::filesystem::path& path) { artifacts_.push_back(path); }
+  /// One more entry of the JSON report.
+  void add_entry(const std::string& name, nlohmann::ordered_json value) { entries_.emplace_back(name, std::move(value)); }
   /// Prints the report.
   void finish() const;
 
@@ -30,6 +34,7 @@ class Job {
   Console console_;
   StageContext context_;
   std::vector<std::filesystem::path> artifacts_;
+  std::vector<std::pair<std::string, nlohmann::ordered_json>> entries_;
 };
 
 }  // namespace heddle

@@ -60,6 +60,7 @@ struct Options {
   CompareOptions compare;
   ChartOptions chart;
   RunOptions run;
+  PlanOptions plan;
 };
 
 void add_common(CLI::App& command, Options& options) {
@@ -79,6 +80,13 @@ void add_building(CLI::App& command, Options& options) {
 void add_order(CLI::App& command, std::optional<int>& order) {
   command.add_option("--order", order, "Highest SH band of the transfer, in place of the fabric's")
       ->check(CLI::Range(0, 5));
+}
+
+template <class Tolerance>
+CLI::Option* add_tolerance(CLI::App& command, int& pictures, const std::string& help, Tolerance& tolerance) {
+  command.add_option("--pictures", pictures, "With --tolerance: pictures that share the data, frames of a shot; 1 where absent")
+      ->check(CLI::Range(1, 1 << 20));
+  return command.add_option("--tolerance", tolerance, help)->check(CLI::Range(1e-6, 100.0));
 }
 
 void add_stage_command(CLI::App& app, Options& options, const std::string& name, const std::string& help,
@@ -114,7 +122,9 @@ std::map<std::string, std::function<int()>> add_commands(CLI::App& app, Options&
   add_stage_command(app, options, "visibility", "Visibility of every segment", StageTarget::kVisibility, true);
   add_stage_command(app, options, "transfer", "Indirect light transfer of every cell", StageTarget::kTransfer, true);
   add_stage_command(app, options, "pack", "The folder that a renderer opens", StageTarget::kPack, false);
-  for (const char* name : {"precompute", "synth", "visibility", "transfer", "pack"}) {
+  add_stage_command(app, options, "accuracy", "What the methods are worth on a fabric: the table that plans are made from",
+                    StageTarget::kAccuracy, false);
+  for (const char* name : {"precompute", "synth", "visibility", "transfer", "pack", "accuracy"}) {
     actions[name] = [&options] {
       if (!options.shard.empty()) options.stage.shard = parse_shard(options.shard);
       return stage_command(options.stage, options.common);
@@ -142,6 +152,8 @@ std::map<std::string, std::function<int()>> add_commands(CLI::App& app, Options&
   render->add_option("--estimator", picture.estimator, "Path tracer: how lights are sampled")
       ->check(CLI::IsMember({"mis", "light", "bcsdf"}));
   add_order(*render, picture.order);
+  add_tolerance(*render, picture.pictures,
+                "Relative RMSE per pixel, noise included: method, samples and data are chosen by a plan", picture.tolerance);
   actions["render"] = [&options] { return render_command(options.render, options.common); };
 
   CLI::App* evaluate =
@@ -162,6 +174,17 @@ std::map<std::string, std::function<int()>> add_commands(CLI::App& app, Options&
       ->check(CLI::NonNegativeNumber);
   actions["compare"] = [&options] { return compare_command(options.compare, options.common); };
 
+  CLI::App* plan = app.add_subcommand("plan", "The cheapest way to a picture that is good enough, and why");
+  add_building(*plan, options);
+  plan->add_option("SCENE.toml", options.plan.scene, "Scene config")->required();
+  add_tolerance(*plan, options.plan.pictures, "Relative RMSE per pixel, noise included: 0.05 is 5 %", options.plan.tolerance)
+      ->required();
+  plan->add_option("--view", options.plan.view, "Name of one of the scene's [[view]] tables; its [camera] where absent");
+  plan->add_option("--crop,--cropwindow", options.plan.crop, "x0,y0,x1,y1 in pixels, x1 and y1 excluded")
+      ->delimiter(',')
+      ->expected(4);
+  actions["plan"] = [&options] { return plan_command(options.plan, options.common); };
+
   CLI::App* chart = app.add_subcommand("chart", "Speed against accuracy, over the methods and their settings");
   ChartOptions& asked = options.chart;
   add_building(*chart, options);
@@ -176,6 +199,9 @@ std::map<std::string, std::function<int()>> add_commands(CLI::App& app, Options&
       ->expected(4);
   chart->add_option("--reference-spp", asked.reference_spp, "Samples per pixel of the two references, 1024 where absent")
       ->check(CLI::Range(2, 1 << 24));
+  chart->add_option("--methods", asked.methods, "Only runs of these methods, separated by commas; all where absent")
+      ->delimiter(',')
+      ->check(CLI::IsMember(method_names()));
   chart->add_flag("--quick", asked.quick, "Few settings per method: a look, or a check that all of it works");
   chart->add_flag("--resume", asked.resume, "Keep what an earlier chart in the same folder has rendered and timed");
   actions["chart"] = [&options] { return chart_command(options.chart, options.common); };

@@ -1,6 +1,7 @@
 #include "pipeline/scene_job.h"
 
 #include <fmt/format.h>
+#include <tbb/parallel_for.h>
 
 #include <cmath>
 
@@ -94,6 +95,7 @@ SceneJob::SceneJob(const fs::path& scene_file, StageContext& context, const Scen
   for (const char* key : {"name", "camera", "view", "render"}) text.erase(key);
   for (auto& cloth : text.at("cloth")) cloth.erase("surface_method");  // part of the key on its own
   scene_text_ = text.dump();
+  for (const std::size_t k : variant.stand_ins) config_.cloths.at(k).surface = config_.cloths.at(k).far_surface;
   for (ClothConfig& cloth : config_.cloths) {
     if (variant.surface_method && cloth.surface && cloth.surface->interactive) {
       cloth.surface_method = *variant.surface_method;
@@ -102,7 +104,7 @@ SceneJob::SceneJob(const fs::path& scene_file, StageContext& context, const Scen
   for (const ClothConfig& cloth : config_.cloths) {
     if (cloth.surface) continue;
     auto& stages = fabrics_[cloth.fabric];
-    if (!stages) stages = std::make_unique<FabricStages>(cloth.fabric, context, variant.fabric);
+    if (!stages) stages = std::make_unique<FabricStages>(cloth.fabric, context, variant.of(cloth.fabric).variant);
   }
 }
 
@@ -121,15 +123,16 @@ PictureRequest SceneJob::request(const ViewConfig& view) const {
 PictureRequest SceneJob::reference_request(const ViewConfig& view) const {
   PictureRequest reference = request(view);
   reference.method = RenderMethod::kPath;
+  reference.seed += 1;
   reference.crop = view.reference->crop;
   reference.spp = view.reference->spp;
   reference.local = view.reference->local;
   return reference;
 }
 
-Needs SceneJob::needs_for(RenderMethod method) const {
+Needs SceneJob::needs_for(RenderMethod method, const fs::path& fabric) const {
   Needs needs = needs_of(method, config_.lights, variant_.blend);
-  needs.order = variant_.order;
+  needs.order = variant_.of(fabric).order;
   return needs;
 }
 
@@ -137,7 +140,7 @@ std::vector<StageCost> SceneJob::precompute_costs(const PictureRequest& request)
   packs_for(request.method);
   std::vector<StageCost> all;
   for (auto& [file, stages] : request.method == RenderMethod::kPrinted ? printed_fabrics() : fabrics_) {
-    for (StageCost& cost : stages->costs(needs_for(request.method))) all.push_back(std::move(cost));
+    for (StageCost& cost : stages->costs(needs_for(request.method, file))) all.push_back(std::move(cost));
   }
   if (!traces_paths(request.method)) {
     loaded_for(request.method);  // the scene, without which its surfaces' data cannot be built
@@ -147,10 +150,9 @@ std::vector<StageCost> SceneJob::precompute_costs(const PictureRequest& request)
 }
 
 std::vector<Artifact> SceneJob::packs_for(RenderMethod method) {
-  const Needs needs = needs_for(method);
   std::vector<Artifact> packs;
   for (auto& [file, stages] : method == RenderMethod::kPrinted ? printed_fabrics() : fabrics_) {
-    packs.push_back(stages->pack(needs));
+    packs.push_back(stages->pack(needs_for(method, file)));
   }
   return packs;
 }
@@ -158,7 +160,8 @@ std::vector<Artifact> SceneJob::packs_for(RenderMethod method) {
 SceneJob::Fabrics& SceneJob::printed_fabrics() {
   if (printed_fabrics_.empty()) {
     for (const auto& [file, stages] : fabrics_) {
-      printed_fabrics_[file] = std::make_unique<FabricStages>(file, *context_, variant_.fabric, BakeChoices::kPrinted);
+      printed_fabrics_[file] =
+          std::make_unique<FabricStages>(file, *context_, variant_.of(file).variant, BakeChoices::kPrinted);
     }
   }
   return printed_fabrics_;
@@ -180,6 +183,7 @@ std::string SceneJob::picture_key(const PictureRequest& request) {
     if (cloth.surface) values.emplace_back("surface", cloth.surface->text);
   }
   for (const std::string& surface : surface_stages().keys()) values.emplace_back("interactive", surface);
+  for (const std::size_t k : variant_.stand_ins) values.emplace_back("stand_in", fmt::format("{}", k));
   for (const fs::path& map : config_.environment_files) values.emplace_back("environment", content_hash_of_file(map));
   for (const MeshFile& mesh : config_.meshes) values.emplace_back("mesh", content_hash_of_file(mesh.path));
   return stage_key(inputs);
@@ -214,6 +218,60 @@ const SceneJob::Loaded& SceneJob::loaded_for(RenderMethod method) {
   if (!traces_paths(method)) loaded->interactive = surface_stages().load(*loaded->scene);
   return *loaded_.emplace(method, std::move(loaded)).first->second;
 }
+
+/// One of the two renderers, set up for a picture.
+struct SceneJob::Shading {
+  std::vector<BcsdfTable> materials;
+  std::optional<PathTracer> tracer;
+  std::optional<PrecomputedRenderer> renderer;
+
+  FrameBuffers frame(const PictureRequest& request, const Camera& camera, const PixelRect& crop,
+                     const RenderProgress& progress) const {
+    if (tracer) return trace_picture(*tracer, camera, crop, request.seed, {request.spp, request.seconds}, progress);
+    return shade_picture(*renderer, camera, crop, request.spp, progress);
+  }
+};
+
+std::unique_ptr<SceneJob::Shading> SceneJob::shading_for(const PictureRequest& request) {
+  const Loaded& loaded = loaded_for(request.method);
+  auto shading = std::make_unique<Shading>();
+  if (traces_paths(request.method)) {
+    shading->materials = scene_materials(*loaded.scene);
+    shading->tracer.emplace(*loaded.scene, shading->materials, config_.lights, config_.background,
+                            path_tracer_settings(request));
+    return shading;
+  }
+  std::vector<const FabricPack*> packs;
+  for (const ClothConfig& cloth : config_.cloths) {
+    if (!cloth.surface) packs.push_back(&loaded.packs.at(cloth.fabric));
+  }
+  const PrecomputedSettings settings{.seed = request.seed,
+                                     .shading = shading_of(request.method),
+                                     .volume = request.method == RenderMethod::kVolume,
+                                     .shadow_sigma_mm = config_.shadow_sigma_mm,
+                                     .blend = variant_.blend,
+                                     .interactive = loaded.interactive};
+  shading->renderer.emplace(*loaded.scene, packs, config_.lights, config_.background, settings);
+  return shading;
+}
+
+SceneJob::Crops SceneJob::render_crops(const PictureRequest& request, std::span<const PixelRect> crops) {
+  const Camera camera(request.camera);
+  loaded_for(request.method);
+  Crops result;
+  const Stopwatch setup;
+  const std::unique_ptr<Shading> shading = shading_for(request);
+  result.setup = setup.elapsed();
+  result.frames.resize(crops.size());
+  const Stopwatch rendering;
+  tbb::parallel_for(std::size_t{0}, crops.size(), [&](std::size_t k) {
+    result.frames[k] = shading->frame(request, camera, crops[k], [](double) { stop_if_interrupted(); });
+  });
+  result.rendering = rendering.elapsed();
+  return result;
+}
+
+const ClothScene& SceneJob::fibers_scene() { return *loaded_for(RenderMethod::kPath).scene; }
 
 PictureResult SceneJob::render(const PictureRequest& request, const std::string& title, bool quiet) {
   const std::string key = picture_key(request);
@@ -250,24 +308,9 @@ PictureResult SceneJob::render(const PictureRequest& request, const std::string&
     shown = now;
   };
 
-  double environment_error = 0;
-  FrameBuffers frame;
-  if (traces_paths(request.method)) {
-    const std::vector<BcsdfTable> materials = scene_materials(*loaded.scene);
-    const PathTracer tracer(*loaded.scene, materials, config_.lights, config_.background,
-                            path_tracer_settings(request));
-    frame = trace_picture(tracer, camera, request.crop, request.seed, {request.spp, request.seconds}, report_progress);
-  } else {
-    const PrecomputedSettings settings{.seed = request.seed,
-                                       .shading = shading_of(request.method),
-                                       .volume = request.method == RenderMethod::kVolume,
-                                       .shadow_sigma_mm = config_.shadow_sigma_mm,
-                                       .blend = variant_.blend,
-                                       .interactive = loaded.interactive};
-    const PrecomputedRenderer renderer(*loaded.scene, packs, config_.lights, config_.background, settings);
-    environment_error = renderer.environment_error();
-    frame = shade_picture(renderer, camera, request.crop, request.spp, report_progress);
-  }
+  const std::unique_ptr<Shading> shading = shading_for(request);
+  const FrameBuffers frame = shading->frame(request, camera, request.crop, report_progress);
+  const double environment_error = shading->renderer ? shading->renderer->environment_error() : 0;
 
   const WorkTime time = watch.elapsed();
 

@@ -8,6 +8,8 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -15,6 +17,7 @@
 #include "formats/image_file.h"
 #include "pipeline/stages.h"
 #include "pipeline/surface_stages.h"
+#include "render/cloth_scene.h"
 #include "render/path_tracer.h"
 #include "render/scene_config.h"
 #include "render/single_scattering.h"
@@ -27,7 +30,20 @@ struct SceneVariant {
   FabricVariant fabric;
   VisibilityBlend blend;
   std::optional<SurfaceMethod> surface_method;  // of all cloths that have a choice; the scene's where empty
+  /// Of one fabric (its file as the scene's config has it), in place of `order` and `fabric`.
+  struct OfFabric {
+    std::optional<int> order;
+    FabricVariant variant;
+    auto operator<=>(const OfFabric&) const = default;
+  };
+  std::map<std::filesystem::path, OfFabric> fabrics = {};
+  std::set<std::size_t> stand_ins = {};  // cloths (places in SceneConfig::cloths) drawn by their far_surface
   auto operator<=>(const SceneVariant&) const = default;
+
+  OfFabric of(const std::filesystem::path& file) const {
+    const auto found = fabrics.find(file);
+    return found != fabrics.end() ? found->second : OfFabric{order, fabric};
+  }
 };
 
 /// One picture of a scene.
@@ -59,7 +75,8 @@ class SceneJob {
   const SceneConfig& config() const { return config_; }
   /// The picture that a view of the scene asks for.
   PictureRequest request(const ViewConfig& view) const;
-  /// The path-traced crop that goes with it.
+  /// The path-traced crop that goes with it. Its seed is the next one: an error against a reference that shares the picture's
+  /// random numbers would look smaller than it is.
   PictureRequest reference_request(const ViewConfig& view) const;
 
   /// Builds what the picture needs; equal keys, equal pictures.
@@ -69,9 +86,22 @@ class SceneJob {
   /// What the precomputed data of the picture took to build, all fabrics; they are built where missing.
   std::vector<StageCost> precompute_costs(const PictureRequest& request);
 
+  /// Frames of some rectangles of the view, in place of request.crop, without progress; builds what the picture needs. The
+  /// work that all of them share (tables of the scattering model, fits of environments) is in `setup`.
+  struct Crops {
+    std::vector<FrameBuffers> frames;  // [crop]
+    WorkTime setup;
+    WorkTime rendering;
+  };
+  Crops render_crops(const PictureRequest& request, std::span<const PixelRect> crops);
+  /// The scene with nothing but its fibers.
+  const ClothScene& fibers_scene();
+
  private:
   struct Loaded;
-  Needs needs_for(RenderMethod method) const;
+  struct Shading;
+  Needs needs_for(RenderMethod method, const std::filesystem::path& fabric) const;
+  std::unique_ptr<Shading> shading_for(const PictureRequest& request);
   using Fabrics = std::map<std::filesystem::path, std::unique_ptr<FabricStages>>;
   Fabrics& printed_fabrics();
   std::vector<Artifact> packs_for(RenderMethod method);

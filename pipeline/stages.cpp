@@ -16,6 +16,7 @@
 #include "formats/input_error.h"
 #include "formats/tensor_file.h"
 #include "pipeline/interrupt.h"
+#include "pipeline/plan/measure_accuracy.h"
 #include "pipeline/version.h"
 #include "precompute/sg_fit.h"
 #include "precompute/ssdf_fit.h"
@@ -30,6 +31,8 @@ namespace fs = std::filesystem;
 // job is killed, and enough work for many threads.
 constexpr std::uint32_t kSegmentsPerChunk = 256;
 constexpr std::uint32_t kCellsPerChunk = 32;
+
+constexpr int kAccuracyVersion = 1;
 
 void write_transfer_chunk(const fs::path& path, const TransferChunk& chunk, int order) {
   const auto cells = static_cast<std::uint64_t>(chunk.paths.size());
@@ -94,6 +97,16 @@ fs::path cost_file(const Stage& stage, const Cache& cache) {
 
 fs::path chunk_cost_file(fs::path chunk) {
   return chunk.replace_extension(".cost.json");
+}
+
+/// Advances a progress of 100 items by the share done.
+AccuracyProgress percent_of(Progress& progress) {
+  return [&progress, shown = std::uint64_t{0}](double share) mutable {
+    stop_if_interrupted();
+    const auto now = static_cast<std::uint64_t>(100 * std::min(share, 1.0));
+    progress.advance(now - shown);
+    shown = now;
+  };
 }
 
 std::string hash_of_geometry(const Exemplar& exemplar) {
@@ -224,6 +237,7 @@ StageCost recorded_cost(const Stage& stage, const Cache& cache) {
   StageCost cost = read_cost(cost_file(stage, cache));
   cost.stage = stage.name;
   cost.key = stage.key;
+  cost.present = fs::exists(cache.artifact(stage.name, stage.key, stage.extension));
   return cost;
 }
 
@@ -526,6 +540,93 @@ Artifact FabricStages::pack(const Needs& needs) {
       write_manifest(folder, std::move(manifest));
     });
   });
+}
+
+Stage FabricStages::accuracy_stage(const SurfaceFabric* surface) {
+  if (surface != nullptr) {
+    return make_stage("accuracy", kAccuracyVersion, ".json", surface->text,
+                      {{"fibers", synth().key}, {"seed", fmt::format("{}", document_.config.seed)}});
+  }
+  std::vector<std::pair<std::string, std::string>> upstream;
+  for (const Stage& stage :
+       {synth_stage(), ssdf_stage(), sg_stage(), transfer_stage(transfer_settings({})), volume_stage()}) {
+    upstream.emplace_back(stage.name, stage.key);
+  }
+  return make_stage("accuracy", kAccuracyVersion, ".json", "", std::move(upstream));
+}
+
+Artifact FabricStages::accuracy_place(const SurfaceFabric* surface) {
+  const Stage stage = accuracy_stage(surface);
+  return {stage.key, context_->cache.artifact(stage.name, stage.key, stage.extension)};
+}
+
+Artifact FabricStages::accuracy(const SurfaceFabric* surface) {
+  const Stage stage = accuracy_stage(surface);
+  return artifact_of(stage, [&](const fs::path& path, StageResult&) {
+    AccuracyTable table;
+    if (surface == nullptr) {
+      table = measure_accuracy_table();
+    } else {
+      Progress progress(*context_->console, stage.name, "%", 100);
+      table = measure_surface_accuracy(exemplar(), *surface, document_.config.seed, percent_of(progress));
+    }
+    table.fabric = document_.config.name;
+    table.key = stage.key;
+    write_accuracy(path, table);
+  });
+}
+
+AccuracyTable FabricStages::measure_accuracy_table() {
+  AccuracyData data;
+  std::map<std::string, WorkTime> costs;
+  const auto note_costs = [&costs](FabricStages& stages, const std::string& suffix) {
+    for (const StageCost& cost : stages.costs(kEverything)) {
+      if (cost.seconds >= 0) costs.try_emplace(cost.stage + suffix, WorkTime{cost.seconds, cost.core_seconds});
+    }
+  };
+  data.pack = load_pack(pack(kEverything).path);
+  note_costs(*this, "");
+  for (const double factor : kOtherCells) {
+    FabricStages other(document_.file, *context_, {.cell_size = factor});
+    data.cells.emplace(factor, read_transfer(other.transfer({}).path));
+    note_costs(other, ", " + cells_setting(factor));
+  }
+  for (const double factor : kOtherVoxels) {
+    FabricStages other(document_.file, *context_, {.voxel_rate = factor});
+    data.voxels.emplace(factor, read_id_volume(other.volume().path));
+    note_costs(other, ", " + voxels_setting(factor));
+  }
+  // Of the variants, only what differs counts.
+  std::erase_if(costs, [](const auto& entry) {
+    const std::string& name = entry.first;
+    const std::size_t comma = name.find(", ");
+    if (comma == std::string::npos) return false;
+    return !name.starts_with(name.substr(comma + 2).starts_with("cells") ? "transfer" : "voxelize");
+  });
+  if (costs.contains("transfer")) {
+    for (const int order : kOtherOrders) {
+      if (order >= data.pack.transfer->order) continue;
+      const double ratio = transfer_order_ratio(order);
+      const WorkTime& whole = costs.at("transfer");
+      costs["transfer, " + order_setting(order)] = {ratio * whole.seconds, ratio * whole.core_seconds};
+    }
+  }
+  Progress progress(*context_->console, "accuracy", "%", 100);
+  AccuracyTable table = measure_accuracy(data, document_.config.seed, percent_of(progress));
+  table.costs = std::move(costs);
+  return table;
+}
+
+/// Time of a few cells' transfer to this order, relative to the fabric's own.
+double FabricStages::transfer_order_ratio(int order) {
+  constexpr std::uint32_t kCells = 16;
+  const auto seconds_to = [&](std::optional<int> highest) {
+    const auto work = transfer_work(transfer_settings(highest));
+    const Stopwatch watch;
+    work->baker->bake(0, std::min(kCells, work->baker->cell_count()));
+    return watch.elapsed().seconds;
+  };
+  return seconds_to(order) / seconds_to({});
 }
 
 void FabricStages::transfer_shard(std::optional<int> order, Shard shard) {

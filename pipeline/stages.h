@@ -11,6 +11,7 @@
 //   transfer    fibers, [transfer], light_from   in chunks  transfer.safetensors     Transfer
 //   voxelize    geometry, [volume]                          volume.vdb               IdVolume
 //   pack        what the pack is to hold                    folder                   FabricPack
+//   accuracy    all of the above                            KEY.json                 AccuracyTable
 //
 // "Geometry" is a hash of the fibers' shapes: a fabric that differs in its dyes only shares maps, ssdf, sg and volume.
 // Keys hold the values of defaults too. An algorithm or a layout that changes needs a new version number of its stage
@@ -34,10 +35,12 @@
 #include "fibers/tracing/tile_scene.h"
 #include "pipeline/cache.h"
 #include "pipeline/console.h"
+#include "pipeline/plan/accuracy_table.h"
 #include "pipeline/work_time.h"
 #include "precompute/transfer_bake.h"
 #include "precompute/visibility_settings.h"
 #include "precompute/voxelize.h"
+#include "render/scene_config.h"
 
 namespace heddle {
 
@@ -101,6 +104,7 @@ struct StageCost {
   double seconds = 0;
   double core_seconds = 0;  // processor time of all threads
   int threads = 0;
+  bool present = false;  // the artifact is in the cache
 };
 
 /// A fabric file, read and checked.
@@ -164,8 +168,14 @@ class FabricStages {
   Artifact volume();
   Artifact pack(const Needs& needs);
 
+  /// What the methods are worth on this fabric (pipeline/plan/measure_accuracy.h). With a surface model: what that is worth in
+  /// place of the fibers.
+  Artifact accuracy(const SurfaceFabric* surface = nullptr);
+  /// Where that lies, built or not; builds the fibers only.
+  Artifact accuracy_place(const SurfaceFabric* surface = nullptr);
+
   /// What the stages behind pack(needs) took when they were built, by whatever process; seconds < 0 where an artifact came
-  /// without its record.
+  /// without its record, or is not there. Builds the fibers only.
   std::vector<StageCost> costs(const Needs& needs);
 
   /// Computes this shard's chunks and leaves them in the cache; a later run of the stage finds them.
@@ -199,6 +209,9 @@ class FabricStages {
   Stage ssdf_stage();
   Stage sg_stage();
   Stage volume_stage();
+  Stage accuracy_stage(const SurfaceFabric* surface);
+  AccuracyTable measure_accuracy_table();
+  double transfer_order_ratio(int order);
   TransferSettings transfer_settings(std::optional<int> order) const;
   Stage transfer_stage(const TransferSettings& settings);
   std::unique_ptr<TransferWork> transfer_work(const TransferSettings& settings);

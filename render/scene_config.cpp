@@ -139,17 +139,17 @@ MeshFile read_mesh(const TomlTable& table) {
 }
 
 /// A preset's name, or a file that ends in .toml, relative to the scene's folder.
-SurfaceFabric read_surface(const TomlTable& table) {
-  const std::string name = table.string("surface");
+SurfaceFabric read_surface(const TomlTable& table, const char* key) {
+  const std::string name = table.string(key);
   const auto document = [&] {
     if (name.ends_with(".toml")) {
       const std::filesystem::path file = std::filesystem::path(table.document_name()).parent_path() / name;
-      if (!std::filesystem::is_regular_file(file)) table.fail("surface", "no such file: " + file.string());
+      if (!std::filesystem::is_regular_file(file)) table.fail(key, "no such file: " + file.string());
       return TomlTable::load(file);
     }
     const std::vector<std::string> known = surface_preset_names();
     if (std::find(known.begin(), known.end(), name) == known.end()) {
-      table.fail("surface", fmt::format("expected a file that ends in .toml, or one of {}", fmt::join(known, ", ")));
+      table.fail(key, fmt::format("expected a file that ends in .toml, or one of {}", fmt::join(known, ", ")));
     }
     return surface_preset(name);
   }();
@@ -184,11 +184,12 @@ ClothConfig read_cloth(const TomlTable& table) {
   }
   if (table.has("fabric") == table.has("surface")) table.fail("fabric", "expected either fabric or surface");
   if (table.has("surface")) {
-    cloth.surface = read_surface(table);
+    cloth.surface = read_surface(table, "surface");
     cloth.surface_method = read_surface_method(table, *cloth.surface);
   } else {
     cloth.fabric = table.existing_file("fabric");
     cloth.underlay = table.boolean("underlay", false);
+    if (table.has("far_surface")) cloth.far_surface = read_surface(table, "far_surface");
   }
   return cloth;
 }

@@ -81,6 +81,7 @@ struct ClothConfig {
   std::filesystem::path fabric;  // fabric TOML; empty where a surface model draws the cloth
   std::optional<SurfaceFabric> surface;
   SurfaceMethod surface_method = SurfaceMethod::kSampled;
+  std::optional<SurfaceFabric> far_surface;  // fibers only: what a plan may draw instead where it is good enough
   bool underlay = false;  // a black copy of the cloth's underside just below it; fibers only
 };
 

@@ -134,7 +134,9 @@ TEST(ConfigDocumentation, NamesEveryKeyOfAScene) {
     add(document, asked);
   }
   // What no scene of ours holds.
-  const std::string more = "[[mesh]]\nmesh = \"../meshes/drape_sphere_64.obj\"\nmesh_unit = \"m\"\n";
+  const std::string more =
+      "[[mesh]]\nmesh = \"../meshes/drape_sphere_64.obj\"\nmesh_unit = \"m\"\n"
+      "[[cloth]]\nflat_mm = [1, 1]\nfabric = \"../fabrics/cotton-tiny.toml\"\nfar_surface = \"silk-shot\"\n";
   std::ifstream stream(kConfigs / "scenes" / "ci.toml");
   std::stringstream text;
   text << stream.rdbuf() << more;

@@ -8,8 +8,12 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <sstream>
 
 #include "formats/image_file.h"
+#include "pipeline/plan/accuracy_table.h"
+#include "pipeline/stages.h"
+#include "pipeline/work_time.h"
 #include "tests/pipeline/program.h"
 #include "tests/pipeline/small_fabric.h"
 #include "tests/support/temporary_folder.h"
@@ -519,6 +523,115 @@ TEST(InputEndToEnd, BadInputIsNamed) {
     EXPECT_EQ(result.status, bad.status) << result.error;
     EXPECT_NE(result.error.find(bad.message), std::string::npos) << result.error;
   }
+}
+
+/// A table under which signed distances alone are as good as both forms of visibility, larger cells too, and everything faster
+/// than paths; where the small fabric's own would lie. Makes plans without measuring for half a minute.
+void store_table(const Workshop& shop, double bias) {
+  std::ostringstream silent;
+  Console console(silent, false, true);
+  StageContext context{.cache = Cache(shop / "cache"), .console = &console, .seed = {}, .results = {}};
+  const fs::path path = FabricStages(shop / "fabric.toml", context).accuracy_place().path;
+  AccuracyTable table;
+  table.fabric = "small";
+  table.key = "by hand";
+  table.threads = working_threads();
+  table.sharpness = {1, kDirectionalSharpness};
+  table.footprint_mm = {0.01, 1};
+  table.bent_footprint_mm = 3;
+  const auto add = [&](const std::string& name, double bias_of_this, double noise, double seconds) {
+    const Accuracy entry{bias_of_this * bias_of_this, 0, noise * noise, Rgbd::Ones()};
+    table.settings.push_back({name, seconds, 1e-3, std::vector<Accuracy>(4, entry), std::vector<Accuracy>(2, entry)});
+  };
+  add("path", 0, 5, 1e-4);
+  add("path-6", 1, 5, 1e-4);
+  add("dual-scattering", 1, 5, 1e-4);
+  for (const char* name : {"exact", "signed distance", "cells x 2", "order 1"}) add(name, bias, 1, 1e-6);
+  for (const char* name : {"volume", "voxels x 0.5", "Gaussians", "cells x 4"}) add(name, 2, 1, 1e-6);
+  for (const auto& [part, seconds] : std::map<std::string, double>{{"maps", 0.01}, {"ssdf", 0.01}, {"sg", 0.01}, {"transfer", 0.01},
+        {"transfer, cells x 2", 0.005}, {"transfer, cells x 4", 0.0025}, {"transfer, order 1", 0.01}, {"voxelize", 0.01}, {"voxelize, voxels x 0.5", 0.01}}) {
+    table.costs[part] = {seconds, seconds};
+  }
+  make_folder(path.parent_path());
+  write_accuracy(path, table);
+}
+
+Json plan_of(const Workshop& shop, const char* tolerance, int status) {
+  const ProgramResult result = shop.run({"plan", "scene.toml", "--tolerance", tolerance, "--json"});
+  EXPECT_EQ(result.status, status) << result.error;
+  return Json::parse(result.out);
+}
+
+TEST(PlanEndToEnd, SaysWhatItWouldDoAndBuildsNothing) {
+  const Workshop shop;
+  store_table(shop, 0.2);
+  const Json plan = plan_of(shop, "4e-1", 0);
+  EXPECT_EQ(plan.at("format"), "heddle plan");
+  EXPECT_EQ(plan.at("choice").at("name"), "exact, signed distance, cells x 2");
+  EXPECT_GT(plan.at("choice").at("build_seconds"), 0);
+  EXPECT_LE(plan.at("choice").at("expected_error"), 0.4);
+  for (const char* stage : {"maps", "ssdf", "sg", "transfer", "voxelize"}) EXPECT_FALSE(fs::exists(shop / "cache" / stage)) << stage;
+  const ProgramResult text = shop.run({"plan", "scene.toml", "--tolerance", "4e-1"});
+  EXPECT_NE(text.out.find("choice    exact, signed distance, cells x 2"), std::string::npos) << text.out;
+  EXPECT_NE(text.out.find("light 2   sg, sharpness 20: visibility by signed distances"), std::string::npos) << text.out;
+}
+
+TEST(PlanEndToEnd, TracesPathsWhereNothingElseIsGoodEnough) {
+  const Workshop shop;
+  store_table(shop, 0.9);
+  const Json plan = plan_of(shop, "4e-1", 0);
+  EXPECT_EQ(plan.at("choice").at("method"), "path");
+  EXPECT_GT(plan_of(shop, "2e-1", 0).at("choice").at("spp"), plan.at("choice").at("spp"));
+}
+
+TEST(PlanEndToEnd, AsksForNoTableWhereAFewPathsDo) {
+  const Workshop shop;
+  const Json plan = plan_of(shop, "5e-1", 0);
+  EXPECT_EQ(plan.at("choice").at("method"), "path");
+  EXPECT_NE(plan.at("note"), "");
+  EXPECT_FALSE(fs::exists(shop / "cache" / "accuracy"));
+}
+
+TEST(PlanEndToEnd, SaysWhatIsOutOfReach) {
+  const Workshop shop;
+  store_table(shop, 0.2);
+  const Json plan = plan_of(shop, "1e-5", 1);
+  EXPECT_TRUE(plan.at("choice").is_null());
+  EXPECT_GT(plan.at("best_tolerance"), 0.00001);
+  const ProgramResult result = shop.run({"render", "scene.toml", "-o", "out.exr", "--tolerance", "1e-5"});
+  EXPECT_EQ(result.status, 1);
+  EXPECT_NE(result.error.find("no way meets this tolerance"), std::string::npos) << result.error;
+  EXPECT_FALSE(fs::exists(shop / "out.exr"));
+  EXPECT_EQ(shop.run({"render", "scene.toml", "-o", "out.exr", "--tolerance", "4e-1", "--spp", "4"}).status, 2);
+}
+
+TEST(RenderEndToEnd, WithinTheToleranceFromWhatWasPlanned) {
+  const Workshop shop;
+  store_table(shop, 0.75);
+  const Json report = shop.report({"render", "scene.toml", "-o", "out.exr", "--tolerance", "12e-1"});
+  ASSERT_TRUE(report.contains("plan"));
+  std::set<std::string> built;
+  for (const Json& stage : report.at("stages")) {
+    if (stage.at("built")) built.insert(stage.at("stage").get<std::string>());
+  }
+  if (report.at("plan").at("choice").at("method") != "path") {
+    EXPECT_EQ(built, (std::set<std::string>{"maps", "ssdf", "transfer", "pack"}));
+  } else {
+    ADD_FAILURE() << "the table says that paths are dear: " << report.at("plan").dump(1);
+  }
+  ASSERT_EQ(shop.run({"render", "scene.toml", "-o", "reference.exr", "--method", "path", "--spp", "256", "--seed", "77"}).status, 0);
+  const Json error = shop.report({"compare", "out.exr", "reference.exr"});
+  EXPECT_LE(error.at("relative_rmse"), 1.2);
+  EXPECT_LE(report.at("expected_error"), 1.2);
+}
+
+TEST(RunEndToEnd, ReferenceHasRandomNumbersOfItsOwn) {
+  const Workshop shop;
+  shop.report({"run", "scene.toml", "-o", "out.d"});
+  const auto seed_of = [&](const char* name) {
+    return read_exr(shop / (std::string("out.d/") + name)).metadata.at("heddle.seed");
+  };
+  EXPECT_NE(seed_of("scene.exr"), seed_of("scene-reference.exr"));
 }
 
 }  // namespace

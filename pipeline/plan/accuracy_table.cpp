@@ -1,0 +1,201 @@
+#include "pipeline/plan/accuracy_table.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "formats/atomic_file.h"
+#include "formats/input_error.h"
+
+namespace heddle {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr int kFormatVersion = 1;
+
+/// Between which two values of an increasing list, and how far on the way, in logarithms; values below 1e-3 count as that.
+struct Place {
+  std::size_t low = 0;
+  std::size_t high = 0;
+  double share = 0;
+};
+Place place_of(const std::vector<double>& values, double value) {
+  const auto logarithm = [](double v) { return std::log(std::max(v, 1e-3)); };
+  if (value <= values.front()) return {0, 0, 0};
+  if (value >= values.back()) return {values.size() - 1, values.size() - 1, 0};
+  const auto above = std::upper_bound(values.begin(), values.end(), value);
+  const auto high = static_cast<std::size_t>(above - values.begin());
+  const double low = logarithm(values[high - 1]);
+  return {high - 1, high, (logarithm(value) - low) / (logarithm(values[high]) - low)};
+}
+
+const Accuracy kNothing{0, 0, 0, Rgbd::Zero()};
+void add_weighted(const Accuracy& entry, double weight, Accuracy& sum) {
+  sum.bias_square += weight * entry.bias_square;
+  sum.bias_square_error += weight * entry.bias_square_error;
+  sum.noise_square += weight * entry.noise_square;
+  sum.color_ratio += weight * entry.color_ratio;
+}
+
+Json entries_json(const std::vector<Accuracy>& entries) {
+  Json json = Json::array();
+  for (const Accuracy& entry : entries) {
+    json.push_back({{"bias_square", entry.bias_square},
+                    {"bias_square_error", entry.bias_square_error},
+                    {"noise_square", entry.noise_square},
+                    {"color_ratio", {entry.color_ratio[0], entry.color_ratio[1], entry.color_ratio[2]}}});
+  }
+  return json;
+}
+
+std::vector<Accuracy> entries_of(const Json& json) {
+  std::vector<Accuracy> entries;
+  for (const Json& values : json) {
+    const auto ratio = values.at("color_ratio").get<std::array<double, 3>>();
+    entries.push_back({values.at("bias_square").get<double>(), values.at("bias_square_error").get<double>(),
+                       values.at("noise_square").get<double>(), Rgbd(ratio[0], ratio[1], ratio[2])});
+  }
+  return entries;
+}
+
+}  // namespace
+
+bool AccuracyTable::has(const std::string& name) const {
+  return std::any_of(settings.begin(), settings.end(), [&](const SettingAccuracy& s) { return s.name == name; });
+}
+
+const SettingAccuracy& AccuracyTable::setting(const std::string& name) const {
+  const auto found =
+      std::find_if(settings.begin(), settings.end(), [&](const SettingAccuracy& s) { return s.name == name; });
+  if (found == settings.end()) throw FileError(fmt::format("accuracy of {}: nothing about \"{}\"", fabric, name));
+  return *found;
+}
+
+Accuracy AccuracyTable::at(const std::string& name, double light_sharpness, double footprint) const {
+  const SettingAccuracy& of = setting(name);
+  const Place light = place_of(sharpness, light_sharpness);
+  const Place pixel = place_of(footprint_mm, footprint);
+  Accuracy result = kNothing;
+  const auto add = [&](std::size_t l, std::size_t f, double weight) {
+    add_weighted(of.entries[l * footprint_mm.size() + f], weight, result);
+  };
+  add(light.low, pixel.low, (1 - light.share) * (1 - pixel.share));
+  add(light.low, pixel.high, (1 - light.share) * pixel.share);
+  add(light.high, pixel.low, light.share * (1 - pixel.share));
+  add(light.high, pixel.high, light.share * pixel.share);
+  return result;
+}
+
+Accuracy AccuracyTable::at_bent(const std::string& name, double light_sharpness) const {
+  const SettingAccuracy& of = setting(name);
+  if (of.bent.empty()) throw FileError(fmt::format("accuracy of {}: nothing about \"{}\" in folds", fabric, name));
+  const Place light = place_of(sharpness, light_sharpness);
+  Accuracy result = kNothing;
+  add_weighted(of.bent[light.low], 1 - light.share, result);
+  add_weighted(of.bent[light.high], light.share, result);
+  return result;
+}
+
+Json accuracy_json(const AccuracyTable& table) {
+  Json json = {{"format", "heddle accuracy"},
+               {"version", kFormatVersion},
+               {"fabric", table.fabric},
+               {"key", table.key},
+               {"threads", table.threads},
+               {"sharpness", table.sharpness},
+               {"footprint_mm", table.footprint_mm},
+               {"bent_footprint_mm", table.bent_footprint_mm}};
+  json["settings"] = Json::array();
+  for (const SettingAccuracy& setting : table.settings) {
+    json["settings"].push_back({{"name", setting.name},
+                                {"seconds_per_sample", setting.seconds_per_sample},
+                                {"setup_seconds", setting.setup_seconds},
+                                {"entries", entries_json(setting.entries)},
+                                {"bent", entries_json(setting.bent)}});
+  }
+  for (const auto& [part, cost] : table.costs) {
+    json["costs"][part] = {{"seconds", cost.seconds}, {"core_seconds", cost.core_seconds}};
+  }
+  return json;
+}
+
+void write_accuracy(const std::filesystem::path& path, const AccuracyTable& table) {
+  write_file_atomically(path, accuracy_json(table).dump(1) + "\n");
+}
+
+AccuracyTable read_accuracy(const std::filesystem::path& path) {
+  const std::vector<std::byte> bytes = read_whole_file(path);
+  const auto* text = reinterpret_cast<const char*>(bytes.data());
+  try {
+    const Json json = Json::parse(text, text + bytes.size());
+    if (json.at("format") != "heddle accuracy" || json.at("version") != kFormatVersion) {
+      throw FileError(path.string() + ": not an accuracy table of this version");
+    }
+    AccuracyTable table;
+    table.fabric = json.at("fabric").get<std::string>();
+    table.key = json.at("key").get<std::string>();
+    table.threads = json.at("threads").get<int>();
+    table.sharpness = json.at("sharpness").get<std::vector<double>>();
+    table.footprint_mm = json.at("footprint_mm").get<std::vector<double>>();
+    table.bent_footprint_mm = json.at("bent_footprint_mm").get<double>();
+    const std::size_t count = table.sharpness.size() * table.footprint_mm.size();
+    const auto increases = [](const std::vector<double>& values) {
+      return !values.empty() && values.front() >= 0 &&
+             std::adjacent_find(values.begin(), values.end(), std::greater_equal<>()) == values.end();
+    };
+    if (!increases(table.sharpness) || !increases(table.footprint_mm) || table.threads < 1) {
+      throw FileError(path.string() + ": an accuracy table without increasing sharpnesses and footprints");
+    }
+    for (const Json& entry : json.at("settings")) {
+      SettingAccuracy setting;
+      setting.name = entry.at("name").get<std::string>();
+      setting.seconds_per_sample = entry.at("seconds_per_sample").get<double>();
+      setting.setup_seconds = entry.at("setup_seconds").get<double>();
+      setting.entries = entries_of(entry.at("entries"));
+      setting.bent = entries_of(entry.at("bent"));
+      if (setting.entries.size() != count || (!setting.bent.empty() && setting.bent.size() != table.sharpness.size())) {
+        throw FileError(path.string() + ": entries of " + setting.name + " are missing");
+      }
+      table.settings.push_back(std::move(setting));
+    }
+    for (const auto& [part, cost] : json.at("costs").items()) {
+      table.costs[part] = {cost.at("seconds").get<double>(), cost.at("core_seconds").get<double>()};
+    }
+    return table;
+  } catch (const nlohmann::json::exception& error) {
+    throw FileError(fmt::format("{}: not an accuracy table: {}", path.string(), error.what()));
+  }
+}
+
+std::string accuracy_text(const AccuracyTable& table) {
+  std::string text = fmt::format("{:<22} {:>12} ", "RMSE in % (noise/√spp)", "sharpness");
+  for (const double footprint : table.footprint_mm) text += fmt::format("{:>12}", fmt::format("{:.3g} mm", footprint));
+  text += fmt::format("{:>12}{:>16}\n", "folded", "µs per sample");
+  for (const SettingAccuracy& setting : table.settings) {
+    for (std::size_t l = 0; l < table.sharpness.size(); ++l) {
+      const bool directional = table.sharpness[l] >= kDirectionalSharpness;
+      text += fmt::format("{:<22} {:>12} ", l == 0 ? setting.name : "",
+                          directional ? "directional" : fmt::format("{:g}", table.sharpness[l]));
+      const auto add = [&text](const Accuracy& entry) {
+        text += fmt::format("{:>12}", fmt::format("{:.1f} ({:.0f})", 100 * std::sqrt(std::max(0.0, entry.bias_square)),
+                                                  100 * std::sqrt(std::max(0.0, entry.noise_square))));
+      };
+      for (std::size_t f = 0; f < table.footprint_mm.size(); ++f)
+        add(setting.entries[l * table.footprint_mm.size() + f]);
+      if (setting.bent.empty()) {
+        text += fmt::format("{:>12}", "");
+      } else {
+        add(setting.bent[l]);
+      }
+      text += l == 0 ? fmt::format("{:>15.3g}\n", 1e6 * setting.seconds_per_sample) : "\n";
+    }
+  }
+  for (const auto& [part, cost] : table.costs) {
+    text += fmt::format("to build {:<26} {:.3g} s ({} threads)\n", part, cost.seconds, table.threads);
+  }
+  return text;
+}
+
+}  // namespace heddle

@@ -1,0 +1,66 @@
+#ifndef HEDDLE_PIPELINE_PLAN_ACCURACY_TABLE_H_
+#define HEDDLE_PIPELINE_PLAN_ACCURACY_TABLE_H_
+// What the methods are worth on one fabric, measured on a flat and on a folded swatch of it (measure_accuracy.h): for lights of several
+// sharpnesses and pixels of several footprints, each setting's error apart from noise, its noise and its speed; and what its
+// data took to build. A small JSON file, the artifact of the stage `accuracy`; the planner reads it before anything else is built.
+// Errors: FileError. Tested in tests/pipeline/plan_test.cpp.
+
+#include <filesystem>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "fibers/math/vector.h"
+#include "pipeline/work_time.h"
+
+namespace heddle {
+
+/// Sharpness that stands for directional light: no spherical Gaussian is told from it.
+inline constexpr double kDirectionalSharpness = 1e5;
+
+/// One setting under one light, at one footprint. Squares are relative to the squared mean radiance.
+struct Accuracy {
+  double bias_square = 0;        // mean square of (setting - path tracing), noise taken out; may be slightly negative
+  double bias_square_error = 0;  // one standard error
+  double noise_square = 0;       // variance of one sample of a pixel
+  Rgbd color_ratio = Rgbd::Ones();
+};
+
+/// The same with what does not depend on light and footprint.
+struct SettingAccuracy {
+  std::string name;
+  double seconds_per_sample = 0;
+  double setup_seconds = 0;       // per picture
+  std::vector<Accuracy> entries;  // [light][footprint], flat
+  std::vector<Accuracy> bent;     // [light], a folded swatch in pixels of bent_footprint_mm; of methods, else empty
+};
+
+struct AccuracyTable {
+  std::string fabric;                // its name
+  std::string key;                   // of the stage
+  int threads = 0;                   // that the times were measured with
+  std::vector<double> sharpness;     // [light] increasing
+  std::vector<double> footprint_mm;  // [footprint] edge of a pixel on the cloth, increasing
+  double bent_footprint_mm = 0;
+  std::vector<SettingAccuracy> settings;  // "path" first
+  std::map<std::string, WorkTime> costs;  // of building, by part: "maps", "transfer, cells x 2", ...
+
+  bool has(const std::string& setting) const;
+  const SettingAccuracy& setting(const std::string& name) const;
+  /// Bilinear in the logarithms of sharpness and footprint; the nearest entry beyond the ends.
+  Accuracy at(const std::string& setting, double sharpness, double footprint_mm) const;
+  /// The same of the folded swatch.
+  Accuracy at_bent(const std::string& setting, double sharpness) const;
+};
+
+nlohmann::ordered_json accuracy_json(const AccuracyTable& table);
+void write_accuracy(const std::filesystem::path& path, const AccuracyTable& table);
+AccuracyTable read_accuracy(const std::filesystem::path& path);
+
+/// The table for people: one line per setting and light.
+std::string accuracy_text(const AccuracyTable& table);
+
+}  // namespace heddle
+
+#endif  // HEDDLE_PIPELINE_PLAN_ACCURACY_TABLE_H_

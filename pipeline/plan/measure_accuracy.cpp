@@ -1,0 +1,448 @@
+#include "pipeline/plan/measure_accuracy.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <utility>
+
+#include "fibers/tracing/tile_scene.h"
+#include "pipeline/work_time.h"
+#include "render/cloth_scene.h"
+#include "render/path_tracer.h"
+#include "render/precomputed_renderer.h"
+
+namespace heddle {
+namespace {
+
+constexpr int kLevels = 6;  // footprints of 1, 2, .. 2^(kLevels - 1) pixels
+
+constexpr double kSharpnesses[] = {3, 20, 150, 1000, kDirectionalSharpness};
+
+// The camera is so far away that its rays are parallel, as far as fibers can tell.
+constexpr double kCameraDistance = 500;  // mm
+// Beyond what is seen: further than light travels in cloth.
+constexpr double kMargin = 10;  // mm
+
+/// Angles from the cloth's normal and about it, degrees.
+struct ViewAndLight {
+  double view_theta, view_phi;
+  double light_theta, light_phi;
+};
+constexpr ViewAndLight kPairs[] = {{10, 20, 35, 80}, {40, 200, 20, 330}, {55, 110, 50, 250}, {30, 290, 60, 300}};
+
+// Folds: a sine wave along x, slopes up to 35 degrees, unrolled without stretch. Of the size that drapes have; in steeper ones (50
+// degrees) the light from slope to slope is more than it is on the drape of configs/meshes.
+constexpr double kWaveLength = 40;   // mm
+constexpr double kWaveHeight = 4.5;  // mm, of its crests over the middle
+constexpr double kBentSeen = 48;     // mm across the picture
+constexpr double kBentSize = 160;    // mm
+constexpr ViewAndLight kBentPairs[] = {{20, 60, 40, 190}, {45, 320, 55, 100}};
+
+Vec3d direction_of(double theta_deg, double phi_deg) {
+  const double theta = radians(theta_deg);
+  const double phi = radians(phi_deg);
+  return {std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta)};
+}
+
+Light light_of(double sharpness, const ViewAndLight& pair) {
+  Light light;
+  light.type = sharpness >= kDirectionalSharpness ? LightType::kDirectional : LightType::kSphericalGaussian;
+  light.sharpness = static_cast<float>(sharpness);
+  light.axis = direction_of(pair.light_theta, pair.light_phi).cast<float>();
+  return light;
+}
+
+/// Sums over the pixels of one footprint's pictures.
+struct Sums {
+  double bias = 0;          // of d0 d1
+  double bias_squares = 0;  // of (d0 d1)^2
+  double variance = 0;      // of one sample
+  double count = 0;         // pixels
+  Rgbd picture = Rgbd::Zero();
+  Rgbd reference = Rgbd::Zero();
+
+  void add(const Sums& other) {
+    bias += other.bias;
+    bias_squares += other.bias_squares;
+    variance += other.variance;
+    count += other.count;
+    picture += other.picture;
+    reference += other.reference;
+  }
+};
+
+/// The halves of a picture, averaged over squares of pixels step by step.
+struct Halves {
+  int edge;
+  std::vector<Rgbd> half0;  // [pixel]
+  std::vector<Rgbd> half1;
+
+  explicit Halves(const FrameBuffers& frame) : edge(frame.width) {
+    for (std::size_t k = 0; k < frame.pixel_count(); ++k) {
+      half0.push_back(frame.half0[k].cast<double>());
+      half1.push_back(frame.half1[k].cast<double>());
+    }
+  }
+  void halve() {
+    const auto average = [this](std::vector<Rgbd>& values) {
+      std::vector<Rgbd> half;
+      for (int y = 0; y < edge; y += 2) {
+        for (int x = 0; x < edge; x += 2) {
+          const auto at = [&](int i, int j) { return values[static_cast<std::size_t>((y + j) * edge + x + i)]; };
+          half.push_back(0.25 * (at(0, 0) + at(1, 0) + at(0, 1) + at(1, 1)));
+        }
+      }
+      values = std::move(half);
+    };
+    average(half0);
+    average(half1);
+    edge /= 2;
+  }
+  double product() const {
+    double sum = 0;
+    for (std::size_t k = 0; k < half0.size(); ++k) sum += (half0[k] * half1[k]).mean();
+    return sum / static_cast<double>(half0.size());
+  }
+};
+
+/// [level], each of pixels twice as wide.
+std::vector<Sums> compare(const FrameBuffers& frame, const FrameBuffers& reference, int level_count) {
+  Halves f(frame);
+  Halves r(reference);
+  double variance = 0;
+  for (const Rgb& value : frame.variance) variance += frame.spp * static_cast<double>(value.mean());
+  variance /= static_cast<double>(frame.pixel_count());
+  const double finest = f.product();
+  std::vector<Sums> levels;
+  for (int level = 0; level < level_count; ++level) {
+    Sums sums;
+    sums.count = static_cast<double>(f.half0.size());
+    for (std::size_t k = 0; k < f.half0.size(); ++k) {
+      const double product = ((f.half0[k] - r.half0[k]) * (f.half1[k] - r.half1[k])).mean();
+      sums.bias += product;
+      sums.bias_squares += product * product;
+      sums.picture += 0.5 * (f.half0[k] + f.half1[k]);
+      sums.reference += 0.5 * (r.half0[k] + r.half1[k]);
+    }
+    // A wide pixel's samples also differ by what narrow ones inside it show.
+    sums.variance = sums.count * (variance + std::max(0.0, finest - f.product()));
+    levels.push_back(sums);
+    if (level + 1 < level_count) {
+      f.halve();
+      r.halve();
+    }
+  }
+  return levels;
+}
+
+/// A sheet in folds, in the middle of the tile's copies.
+ClothMesh folded_cloth() {
+  constexpr int kAlong = 192;
+  constexpr int kAcross = 24;
+  ClothMesh mesh;
+  const double wave_number = 2 * kPi / kWaveLength;
+  const auto slope = [&](double x) { return kWaveHeight * wave_number * std::cos(wave_number * x); };
+  double length = 0;  // along the sheet
+  for (int i = 0; i <= kAlong; ++i) {
+    const double step = kBentSize / kAlong;
+    const double x = (static_cast<double>(i) / kAlong - 0.5) * kBentSize;
+    if (i > 0) length += step * std::hypot(1.0, slope(x - 0.5 * step));
+    for (int j = 0; j <= kAcross; ++j) {
+      const double y = (static_cast<double>(j) / kAcross - 0.5) * kBentSize;
+      mesh.positions.emplace_back(x, y, kWaveHeight * std::sin(wave_number * x));
+      mesh.normals.push_back(Vec3d(-slope(x), 0, 1).normalized());
+      mesh.fabric.emplace_back(length, y);
+    }
+  }
+  const auto vertex = [](int i, int j) { return static_cast<std::uint32_t>(i * (kAcross + 1) + j); };
+  for (int i = 0; i < kAlong; ++i) {
+    for (int j = 0; j < kAcross; ++j) {
+      mesh.triangles.push_back({vertex(i, j), vertex(i + 1, j), vertex(i + 1, j + 1)});
+      mesh.triangles.push_back({vertex(i, j), vertex(i + 1, j + 1), vertex(i, j + 1)});
+    }
+  }
+  return mesh;
+}
+
+class Swatch {
+ public:
+  Swatch(const Exemplar& exemplar, std::uint64_t seed, const AccuracyEffort& effort) : seed_(seed), effort_(effort) {
+    // As wide as the fibers, in the mean over segments.
+    double diameter = 0;
+    for (std::uint32_t segment = 0; segment < exemplar.segment_count(); ++segment) {
+      diameter += 2.0 * static_cast<double>(exemplar.radius_mm[exemplar.segment_fiber[segment]]);
+    }
+    pixel_mm_ = diameter / static_cast<double>(exemplar.segment_count());
+    const double size = 4 * (effort.pixels * pixel_mm_ + kMargin) + 2 * std::max(exemplar.width_mm, exemplar.height_mm);
+    ClothConfig cloth;
+    cloth.flat_width_mm = size;
+    cloth.flat_height_mm = size;
+    config_.cloths = {cloth};
+    tile_mm_ = {exemplar.width_mm, exemplar.height_mm};
+  }
+
+  double pixel_mm() const { return pixel_mm_; }
+  std::uint64_t seed() const { return seed_; }
+  const AccuracyEffort& effort() const { return effort_; }
+
+  void use_fibers(const std::shared_ptr<const TileScene>& tile) {
+    config_.cloths[0].surface.reset();
+    flat_.reset(new ClothScene(make_cloth_scene(config_, std::span(&tile, 1))));
+    bent_ = std::make_unique<ClothScene>(std::vector<ClothPiece>{{tile, folded_cloth(), true}},
+                                         std::vector<TriangleMesh>{});
+  }
+  void use_surface(const SurfaceFabric& surface) {
+    config_.cloths[0].surface = surface;
+    flat_.reset(new ClothScene(make_cloth_scene(config_, {})));
+    std::vector<SurfaceCloth> surfaces;
+    surfaces.emplace_back(surface.model, folded_cloth());
+    bent_ = std::make_unique<ClothScene>(std::vector<ClothPiece>{}, std::vector<TriangleMesh>{}, std::move(surfaces));
+  }
+  const ClothScene& scene(bool bent) const { return bent ? *bent_ : *flat_; }
+
+  /// Each pair looks at another part of the tile.
+  Camera camera(std::size_t pair) const {
+    const auto index = static_cast<double>(pair);
+    return square_camera(kPairs[pair], {index * 0.754877 * tile_mm_[0], index * 0.569840 * tile_mm_[1], 0},
+                         effort_.pixels * pixel_mm_, effort_.pixels);
+  }
+  static Camera bent_camera(std::size_t pair, int pixels) {
+    return square_camera(kBentPairs[pair], {0, 0, 0}, kBentSeen, pixels);
+  }
+
+ private:
+  static Camera square_camera(const ViewAndLight& pair, const Vec3d& place, double width_mm, int pixels) {
+    CameraConfig camera;
+    camera.look_at = place;
+    camera.position = place + kCameraDistance * direction_of(pair.view_theta, pair.view_phi);
+    camera.up = Vec3d(0.3, 1, 0);
+    camera.fov = 2 * std::atan(0.5 * width_mm / kCameraDistance);
+    camera.fov_axis = FovAxis::kHorizontal;
+    camera.width = camera.height = pixels;
+    return Camera(camera);
+  }
+
+  std::uint64_t seed_;
+  AccuracyEffort effort_;
+  SceneConfig config_;
+  std::array<double, 2> tile_mm_{};
+  double pixel_mm_ = 0;
+  std::unique_ptr<ClothScene> flat_;
+  std::unique_ptr<ClothScene> bent_;
+};
+
+/// A picture of a view under lights, and what it took.
+struct Shot {
+  FrameBuffers frame;
+  double setup_seconds = 0;
+  double seconds = 0;
+};
+using Shoot = std::function<Shot(const Camera&, const std::vector<Light>&, bool bent)>;
+
+class TableMaker {
+ public:
+  TableMaker(const Swatch& swatch, std::size_t settings, const AccuracyProgress& progress)
+      : swatch_(&swatch), progress_(&progress), steps_(settings) {
+    table_.threads = working_threads();
+    for (const double sharpness : kSharpnesses) table_.sharpness.push_back(sharpness);
+    table_.bent_footprint_mm = kBentSeen / swatch.effort().bent_pixels;
+    for (int level = 0; level < kLevels; ++level) table_.footprint_mm.push_back(std::ldexp(swatch.pixel_mm(), level));
+  }
+
+  /// The first setting is the reference of all. In folds only what all settings of a method have in common is measured.
+  void add(const std::string& name, const Shoot& shoot, bool in_folds) {
+    SettingAccuracy setting;
+    setting.name = name;
+    double samples = 0;
+    std::size_t shots = 0;
+    const bool is_reference = table_.settings.empty();
+    const auto compare_with = [&](std::size_t picture, const Camera& camera, const Light& light, bool bent,
+                                  int levels) {
+      (*progress_)((static_cast<double>(done_) + static_cast<double>(shots) / kShots) / static_cast<double>(steps_));
+      const Shot shot = shoot(camera, {light}, bent);
+      if (is_reference) reference_.push_back(shot.frame);
+      setting.setup_seconds += shot.setup_seconds;
+      setting.seconds_per_sample += shot.seconds;
+      samples += static_cast<double>(shot.frame.pixel_count()) * shot.frame.spp;
+      ++shots;
+      return compare(shot.frame, reference_[picture], levels);
+    };
+    std::size_t picture = 0;
+    for (const double sharpness : kSharpnesses) {
+      std::vector<Sums> levels(kLevels);
+      for (std::size_t pair = 0; pair < std::size(kPairs); ++pair) {
+        const std::vector<Sums> sums =
+            compare_with(picture++, swatch_->camera(pair), light_of(sharpness, kPairs[pair]), false, kLevels);
+        for (std::size_t level = 0; level < kLevels; ++level) levels[level].add(sums[level]);
+      }
+      for (const Sums& sums : levels) setting.entries.push_back(accuracy_of(sums));
+      Sums bent;
+      for (std::size_t pair = 0; pair < std::size(kBentPairs); ++pair, ++picture) {
+        if (!in_folds) continue;
+        const Camera camera = Swatch::bent_camera(pair, swatch_->effort().bent_pixels);
+        bent.add(compare_with(picture, camera, light_of(sharpness, kBentPairs[pair]), true, 1)[0]);
+      }
+      if (in_folds) setting.bent.push_back(accuracy_of(bent));
+    }
+    setting.setup_seconds /= static_cast<double>(shots);
+    setting.seconds_per_sample /= samples;
+    table_.settings.push_back(std::move(setting));
+    ++done_;
+  }
+
+  AccuracyTable take() { return std::move(table_); }
+
+ private:
+  static constexpr double kShots =
+      static_cast<double>(std::size(kSharpnesses) * (std::size(kPairs) + std::size(kBentPairs)));
+
+  static Accuracy accuracy_of(const Sums& sums) {
+    const double mean = sums.reference.mean() / sums.count;
+    const double scale = 1 / (sums.count * mean * mean);
+    const double spread = std::max(0.0, sums.bias_squares - sums.bias * sums.bias / sums.count);
+    return {sums.bias * scale, std::sqrt(spread) * scale, sums.variance * scale, sums.picture / sums.reference};
+  }
+
+  const Swatch* swatch_;
+  const AccuracyProgress* progress_;
+  std::size_t steps_;
+  std::size_t done_ = 0;
+  std::vector<FrameBuffers> reference_;  // [light][pair, bent pair]
+  AccuracyTable table_;
+};
+
+const RenderProgress kSilent = [](double) {};
+
+Shoot paths(const Swatch& swatch, int flat_samples, int max_scatterings) {
+  return [&swatch, flat_samples, max_scatterings](const Camera& camera, const std::vector<Light>& lights, bool bent) {
+    const int samples = flat_samples * (bent ? swatch.effort().bent_factor : 1);
+    PathTracerSettings settings;
+    settings.seed = swatch.seed();
+    if (max_scatterings > 0) settings.limits.max_scatterings = max_scatterings;
+    Shot shot;
+    const Stopwatch setup;
+    const std::vector<BcsdfTable> materials = scene_materials(swatch.scene(bent));
+    const PathTracer tracer(swatch.scene(bent), materials, lights, Rgb(0, 0, 0), settings);
+    shot.setup_seconds = setup.elapsed().seconds;
+    const Stopwatch watch;
+    shot.frame = trace_picture(tracer, camera, camera.full_frame(), settings.seed, {samples, {}}, kSilent);
+    shot.seconds = watch.elapsed().seconds;
+    return shot;
+  };
+}
+
+Shoot precomputed(const Swatch& swatch, const FabricPack& pack, const PrecomputedSettings& settings) {
+  return [&swatch, &pack, settings](const Camera& camera, const std::vector<Light>& lights, bool bent) {
+    Shot shot;
+    const FabricPack* packs[] = {&pack};
+    const Stopwatch setup;
+    const PrecomputedRenderer renderer(swatch.scene(bent), packs, lights, Rgb(0, 0, 0), settings);
+    shot.setup_seconds = setup.elapsed().seconds;
+    const Stopwatch watch;
+    shot.frame = shade_picture(renderer, camera, camera.full_frame(),
+                               swatch.effort().method_samples * (bent ? swatch.effort().bent_factor : 1), kSilent);
+    shot.seconds = watch.elapsed().seconds;
+    return shot;
+  };
+}
+
+}  // namespace
+
+std::string order_setting(int order) {
+  return fmt::format("order {}", order);
+}
+std::string cells_setting(double factor) {
+  return fmt::format("cells x {:g}", factor);
+}
+std::string voxels_setting(double factor) {
+  return fmt::format("voxels x {:g}", factor);
+}
+std::string surface_setting(const std::string& surface) {
+  return "surface " + surface;
+}
+
+Transfer cut_to_order(const Transfer& transfer, int order) {
+  if (order >= transfer.order) return transfer;
+  Transfer result = transfer;
+  result.order = order;
+  const auto all = static_cast<std::size_t>(transfer.coefficients());
+  const auto kept = static_cast<std::size_t>(result.coefficients());
+  // The first kept_rows of every `rows` rows, and the first kept_columns of every row.
+  const auto cut = [](std::vector<float>& values, std::size_t rows, std::size_t columns, std::size_t kept_rows,
+                      std::size_t kept_columns) {
+    std::vector<float> low;
+    for (std::size_t row = 0; row < values.size() / columns; ++row) {
+      if (row % rows >= kept_rows) continue;
+      const auto first = values.begin() + static_cast<std::ptrdiff_t>(row * columns);
+      low.insert(low.end(), first, first + static_cast<std::ptrdiff_t>(kept_columns));
+    }
+    values = std::move(low);
+  };
+  cut(result.matrices, all, 3 * all, kept, 3 * kept);
+  cut(result.standard_error, 1, 3 * static_cast<std::size_t>(transfer.order + 1), 1,
+      3 * static_cast<std::size_t>(order + 1));
+  if (result.cones) {
+    constexpr std::size_t kOnCone = 3 * ConeTransfer::kAzimuths;
+    cut(result.cones->harmonics, all, 3 * all, kept, 3 * kept);
+    cut(result.cones->moments, all, kOnCone, kept, kOnCone);
+  }
+  return result;
+}
+
+AccuracyTable measure_accuracy(AccuracyData& data, std::uint64_t seed, const AccuracyProgress& progress,
+                               const AccuracyEffort& effort) {
+  FabricPack& pack = data.pack;
+  Swatch swatch(pack.exemplar, seed, effort);
+  swatch.use_fibers(std::make_shared<const TileScene>(pack.exemplar));
+  const int order = pack.transfer->order;
+  const auto lower_orders =
+      std::count_if(std::begin(kOtherOrders), std::end(kOtherOrders), [&](int other) { return other < order; });
+  TableMaker maker(swatch, 7 + static_cast<std::size_t>(lower_orders) + data.cells.size() + data.voxels.size(),
+                   progress);
+  const PrecomputedSettings usual{.seed = seed, .shadow_sigma_mm = {}, .blend = {}, .interactive = {}};
+  const auto with = [&](auto&& change) {
+    PrecomputedSettings settings = usual;
+    change(settings);
+    return precomputed(swatch, pack, settings);
+  };
+  maker.add("path", paths(swatch, effort.path_samples, 0), true);
+  maker.add("path-6", paths(swatch, effort.method_samples, 6), true);
+  maker.add("dual-scattering", with([](auto& settings) { settings.shading = LocalShading::kDualScattering; }), true);
+  maker.add("exact", precomputed(swatch, pack, usual), true);
+  maker.add("volume", with([](auto& settings) { settings.volume = true; }), true);
+  maker.add(kDistanceSetting, with([](auto& settings) { settings.blend = kSignedDistanceOnly; }), false);
+  maker.add(kGaussiansSetting, with([](auto& settings) { settings.blend = kLobesOnly; }), false);
+  // Settings of the data: the other data take the place of the pack's while a setting is measured.
+  const Transfer own = *pack.transfer;
+  for (const int other : kOtherOrders) {
+    if (other >= order) continue;
+    pack.transfer = cut_to_order(own, other);
+    maker.add(order_setting(other), precomputed(swatch, pack, usual), false);
+  }
+  for (auto& [factor, transfer] : data.cells) {
+    pack.transfer = transfer;
+    maker.add(cells_setting(factor), precomputed(swatch, pack, usual), false);
+  }
+  pack.transfer = own;
+  for (auto& [factor, volume] : data.voxels) {
+    std::swap(*pack.volume, volume);
+    maker.add(voxels_setting(factor), with([](auto& settings) { settings.volume = true; }), false);
+    std::swap(*pack.volume, volume);
+  }
+  return maker.take();
+}
+
+AccuracyTable measure_surface_accuracy(const Exemplar& exemplar, const SurfaceFabric& surface, std::uint64_t seed,
+                                       const AccuracyProgress& progress, const AccuracyEffort& effort) {
+  Swatch swatch(exemplar, seed, effort);
+  TableMaker maker(swatch, 2, progress);
+  swatch.use_fibers(std::make_shared<const TileScene>(exemplar));
+  maker.add("path", paths(swatch, effort.path_samples, 0), true);
+  swatch.use_surface(surface);
+  maker.add(surface_setting(surface.name), paths(swatch, effort.method_samples, 0), true);
+  return maker.take();
+}
+
+}  // namespace heddle

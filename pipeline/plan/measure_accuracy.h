@@ -1,0 +1,77 @@
+#ifndef HEDDLE_PIPELINE_PLAN_MEASURE_ACCURACY_H_
+#define HEDDLE_PIPELINE_PLAN_MEASURE_ACCURACY_H_
+// Fills an accuracy table: every setting against path tracing on a flat swatch of the fabric, and on one that lies in folds over
+// black, by the renderers' own code.
+//
+// Four pairs of view and light, five sharpnesses; each a picture of 64 x 64 pixels as wide as a fiber. Errors of wider pixels
+// come from the same pictures: differences, averaged over squares of pixels, before they are squared. Path tracing and method
+// share their eye rays (probe.h). Squares of the four pairs are added before they are divided by the squared mean radiance, as in
+// a picture that shows all four. Folds bring light that grazes, shadows that end, and light from one slope to the next: two pairs,
+// pixels of a few millimetres, many samples each.
+// Settings, all else as the fabric says:
+//   path, path-6, dual-scattering             nothing baked
+//   exact, volume                             everything
+//   order K                                   exact with the transfer cut to harmonics up to K: the same as one baked to that order
+//   cells x F                                 exact with larger cells (FabricVariant::cell_size)
+//   voxels x F                                volume with larger voxels (FabricVariant::voxel_rate)
+//   signed distance, Gaussians                exact with one form of visibility for all spherical Gaussians
+// Tested in tests/pipeline/plan_test.cpp.
+
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "fibers/baked/fabric_pack.h"
+#include "pipeline/plan/accuracy_table.h"
+#include "render/scene_config.h"
+
+namespace heddle {
+
+/// Names of settings, also used by the planner.
+std::string order_setting(int order);
+std::string cells_setting(double factor);
+std::string voxels_setting(double factor);
+std::string surface_setting(const std::string& surface);
+inline constexpr char kDistanceSetting[] = "signed distance";
+inline constexpr char kGaussiansSetting[] = "Gaussians";
+
+/// What is tried besides the fabric's own settings.
+inline constexpr int kOtherOrders[] = {1, 3};
+inline constexpr double kOtherCells[] = {2, 4};
+inline constexpr double kOtherVoxels[] = {0.5};
+
+/// Data of the other settings; the pack holds the fabric's own.
+struct AccuracyData {
+  FabricPack pack;                    // everything
+  std::map<double, Transfer> cells;   // by factor
+  std::map<double, IdVolume> voxels;  // by factor
+};
+
+/// The transfer as baked to a lower order.
+Transfer cut_to_order(const Transfer& transfer, int order);
+
+/// How much is measured; less is for tests.
+struct AccuracyEffort {
+  int pixels = 64;        // along an edge of a flat picture, a power of two of at least 32
+  int bent_pixels = 16;   // of a folded one
+  int path_samples = 16;  // per pixel, flat; `bent_factor` times as many in folds; even
+  int method_samples = 4;
+  int bent_factor = 8;
+};
+
+/// Called with the share done, 0 .. 1; may throw to stop.
+using AccuracyProgress = std::function<void(double)>;
+
+/// sharpness, footprint_mm, settings and threads of a table. `data` is as it was afterwards.
+AccuracyTable measure_accuracy(AccuracyData& data, std::uint64_t seed, const AccuracyProgress& progress,
+                               const AccuracyEffort& effort = {});
+
+/// The same for one surface model in place of the fibers: settings "path" and surface_setting(name).
+AccuracyTable measure_surface_accuracy(const Exemplar& exemplar, const SurfaceFabric& surface, std::uint64_t seed,
+                                       const AccuracyProgress& progress, const AccuracyEffort& effort = {});
+
+}  // namespace heddle
+
+#endif  // HEDDLE_PIPELINE_PLAN_MEASURE_ACCURACY_H_

@@ -1,0 +1,70 @@
+#include "pipeline/plan/planner.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace heddle {
+namespace {
+
+// Standard errors added to what a candidate is thought to err by. More would turn away fast methods whose error is near the
+// tolerance, at a high price; less would miss it.
+constexpr double kCaution = 0.7;
+// Share of the squared tolerance that is aimed at: the noise of a picture is itself uncertain.
+constexpr double kAim = 0.92;
+
+double cautious(const Estimate& square) {
+  return std::max(0.0, square.value) + kCaution * square.error;
+}
+
+/// Squared error that noise may have.
+double room(const Candidate& candidate, double tolerance) {
+  return kAim * tolerance * tolerance - cautious(candidate.bias_square);
+}
+
+}  // namespace
+
+std::optional<Offer> offer(const Candidate& candidate, double tolerance, int pictures) {
+  const double left = room(candidate, tolerance);
+  const double needed = left > 0 ? cautious(candidate.noise_square) / left : std::numeric_limits<double>::infinity();
+  if (!(needed <= kMostSamples)) return {};
+  Offer result;
+  const int steps = static_cast<int>(std::ceil(needed / candidate.spp_step));
+  result.spp = candidate.spp_step * std::max(1, steps);
+  result.seconds_per_picture = candidate.setup_seconds + result.spp * candidate.seconds_per_spp;
+  result.seconds = candidate.build_seconds + pictures * result.seconds_per_picture;
+  result.expected_error =
+      std::sqrt(std::max(0.0, candidate.bias_square.value) + std::max(0.0, candidate.noise_square.value) / result.spp);
+  return result;
+}
+
+std::optional<std::size_t> cheapest(std::span<const Candidate> candidates, double tolerance, int pictures) {
+  std::optional<std::size_t> best;
+  double seconds = 0;
+  for (std::size_t k = 0; k < candidates.size(); ++k) {
+    const std::optional<Offer> made = offer(candidates[k], tolerance, pictures);
+    if (!made || (best && made->seconds >= seconds)) continue;
+    best = k;
+    seconds = made->seconds;
+  }
+  return best;
+}
+
+double best_tolerance(std::span<const Candidate> candidates) {
+  double best = std::numeric_limits<double>::infinity();
+  for (const Candidate& candidate : candidates) {
+    const double square = cautious(candidate.bias_square) + cautious(candidate.noise_square) / kMostSamples;
+    best = std::min(best, std::sqrt(square / kAim));
+  }
+  return best;
+}
+
+Estimate combined(const Estimate& a, const Estimate& b) {
+  if (!(a.error > 0)) return a;
+  if (!(b.error > 0)) return b;
+  const double weight_a = 1 / (a.error * a.error);
+  const double weight_b = 1 / (b.error * b.error);
+  return {(weight_a * a.value + weight_b * b.value) / (weight_a + weight_b), 1 / std::sqrt(weight_a + weight_b)};
+}
+
+}  // namespace heddle

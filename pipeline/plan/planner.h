@@ -1,0 +1,53 @@
+#ifndef HEDDLE_PIPELINE_PLAN_PLANNER_H_
+#define HEDDLE_PIPELINE_PLAN_PLANNER_H_
+// The arithmetic of a plan, apart from where its numbers come from: how many samples a way to make a picture needs for a
+// tolerance, what that costs, and which way is cheapest.
+//
+// Error of a picture of n samples per pixel: sqrt(bias^2 + noise^2 / n), relative RMSE. What is not known exactly counts with
+// part of its standard error on the safe side. Tighter tolerances never get cheaper.
+// Tested in tests/pipeline/plan_test.cpp.
+
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "pipeline/plan/probe.h"
+
+namespace heddle {
+
+/// One way to make a picture. Squares are relative to the squared mean radiance.
+struct Candidate {
+  std::string name;
+  Estimate bias_square;        // 0 for path tracing
+  Estimate noise_square;       // variance of one sample of a pixel
+  double build_seconds = 0;    // of data that the cache lacks
+  double setup_seconds = 0;    // of every picture
+  double seconds_per_spp = 0;  // of every picture
+  int spp_step = 1;            // samples come in multiples of this
+};
+
+/// What a candidate takes to meet a tolerance.
+struct Offer {
+  int spp = 0;
+  double seconds_per_picture = 0;
+  double seconds = 0;         // building, and all pictures
+  double expected_error = 0;  // relative RMSE, without safety
+};
+
+/// Nothing where the candidate's bias alone is too large, or more than kMostSamples would be needed.
+inline constexpr int kMostSamples = 1 << 20;
+std::optional<Offer> offer(const Candidate& candidate, double tolerance, int pictures);
+
+/// The cheapest of those that meet the tolerance; nothing where none does.
+std::optional<std::size_t> cheapest(std::span<const Candidate> candidates, double tolerance, int pictures);
+
+/// The smallest tolerance that some candidate meets.
+double best_tolerance(std::span<const Candidate> candidates);
+
+/// Two independent estimates of one quantity.
+Estimate combined(const Estimate& a, const Estimate& b);
+
+}  // namespace heddle
+
+#endif  // HEDDLE_PIPELINE_PLAN_PLANNER_H_

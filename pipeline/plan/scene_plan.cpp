@@ -1,0 +1,630 @@
+#include "pipeline/plan/scene_plan.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <utility>
+
+#include "pipeline/picture_request.h"
+#include "pipeline/plan/measure_accuracy.h"
+#include "pipeline/plan/probe.h"
+#include "pipeline/scene_needs.h"
+
+namespace heddle {
+namespace {
+
+namespace fs = std::filesystem;
+
+// The pilot's pixels come in blocks of this edge: neighbours share cache lines, and blocks tell how much the picture varies.
+constexpr int kBlockEdge = 8;
+// Of the first pilot; less of a small picture.
+constexpr int kFirstPixels = 1024;
+constexpr int kPilotSamples = 4;
+// A pilot of the chosen way may take this share of its pictures' time if its noise is not known well enough before.
+constexpr double kPilotShare = 0.08;
+constexpr double kNoiseKnown = 0.08;  // relative standard error
+// Cheapest ways tried before the plan settles for what is known.
+constexpr int kMostTries = 8;
+// How far an error on the flat swatch is from that of a scene, relative, one standard error (docs/plan.md).
+constexpr double kTableError = 0.5;
+// The same of a pilot's few pixels.
+constexpr double kPilotError = 0.4;
+// The pilot's random numbers are not those of the picture.
+constexpr std::uint64_t kPilotSeed = 0x9107;
+// Fabrics of one scene whose settings are chosen apart: there are up to 6 choices for each.
+constexpr std::size_t kMostApart = 3;
+// Path-traced samples in the time that an accuracy table takes, its own data left out (measure_accuracy.h): where a plan needs
+// fewer in all, path tracing is cheaper than finding out.
+constexpr double kTableSamples = 2e6;
+
+/// What a fabric's tables and stages say; one per fabric file.
+struct Fabric {
+  fs::path file;
+  std::string name;
+  int order = 5;  // its own
+  std::optional<AccuracyTable> table;
+  // Stages with the data of a variant. The fabric's own always exist.
+  std::map<FabricVariant, std::unique_ptr<FabricStages>> stages;
+};
+
+struct LightShare {
+  double sharpness;
+  double weight;  // of all the light that a cloth receives
+};
+
+class ScenePlanner {
+ public:
+  ScenePlanner(const PlanQuestion& question, StageContext& context)
+      : context_(&context), job_(std::make_unique<SceneJob>(question.scene, context)) {
+    plan_.question = question;
+    plan_.scene = job_->config();
+    plan_.request = job_->request(find_view(plan_.scene, question.view));
+    if (!question.crop.empty()) plan_.request.crop = parse_crop(question.crop, plan_.request.camera);
+    const PixelRect& crop = plan_.request.crop;
+    pixels_ = static_cast<double>(crop.width) * crop.height;
+  }
+
+  ScenePlan make() {
+    job_->fibers_scene();
+    const Stopwatch watch;
+    const int first = static_cast<int>(std::clamp(pixels_ / 4, 256.0, static_cast<double>(kFirstPixels)));
+    trace_pilot(first, kPilotSamples);
+    look_at_cloths();
+    add_path();
+    find_fabrics();
+    // Surface models are lit the same way by all methods.
+    if (!fabrics_.empty() && read_tables()) add_other_ways();
+    settle();
+    plan_.best_tolerance = best_tolerance(candidates());
+    plan_.time = watch.elapsed() - loading_;
+    return std::move(plan_);
+  }
+
+ private:
+  // --- The pilot -------------------------------------------------------------------------------------------------------------
+
+  PictureRequest pilot_request(RenderMethod method, int spp) const {
+    PictureRequest request = plan_.request;
+    request.method = method;
+    request.spp = spp;
+    request.seed += kPilotSeed;
+    return request;
+  }
+
+  SceneJob::Crops shoot(SceneJob& job, const PictureRequest& request) {
+    const Stopwatch watch;
+    SceneJob::Crops crops = job.render_crops(request, blocks_);
+    loading_ = loading_ + (watch.elapsed() - crops.setup - crops.rendering);
+    return crops;
+  }
+
+  double seconds_per_spp(const SceneJob::Crops& crops, int spp) const {
+    double pixels = 0;
+    for (const FrameBuffers& frame : crops.frames) pixels += static_cast<double>(frame.pixel_count());
+    return crops.rendering.seconds / (pixels * spp) * pixels_;
+  }
+
+  void trace_pilot(int pixels, int spp) {
+    blocks_ = spread_blocks(plan_.request.crop, kBlockEdge, pixels);
+    const SceneJob::Crops crops = shoot(*job_, pilot_request(RenderMethod::kPath, spp));
+    paths_ = crops.frames;
+    path_spp_ = spp;
+    pilot_pixels_ = 0;
+    for (const FrameBuffers& frame : paths_) pilot_pixels_ += static_cast<double>(frame.pixel_count());
+    path_setup_ = crops.setup.seconds;
+    path_seconds_per_spp_ = seconds_per_spp(crops, spp);
+    path_variance_ = sample_variance(paths_);
+    mean_ = {mean_radiance(paths_), std::sqrt(path_variance_.value / (pilot_pixels_ * spp))};
+  }
+
+  /// An absolute square relative to the mean radiance; the mean's own error counts.
+  Estimate relative(const Estimate& square) const {
+    const double scale = mean_.value > 0 ? 1 / (mean_.value * mean_.value) : 0;
+    const double of_mean = mean_.value > 0 ? 2 * std::min(1.0, mean_.error / mean_.value) * square.value : 0;
+    return {square.value * scale, std::hypot(square.error, of_mean) * scale};
+  }
+
+  // --- The scene -------------------------------------------------------------------------------------------------------------
+
+  void look_at_cloths() {
+    const SceneConfig& scene = plan_.scene;
+    plan_.seen.resize(scene.cloths.size());
+    lights_of_cloth_.resize(scene.cloths.size());
+    lights_ = fit_environments(scene.lights).lights;
+    std::vector<std::size_t> cloth_of_fibers;
+    for (std::size_t k = 0; k < scene.cloths.size(); ++k) {
+      if (!scene.cloths[k].surface) cloth_of_fibers.push_back(k);
+    }
+    const ClothScene& fibers = job_->fibers_scene();
+    const Camera camera(plan_.request.camera);
+    std::vector<std::vector<double>> facing(scene.cloths.size(), std::vector<double>(lights_.size(), 0.0));
+    double all_light = 0;
+    for (std::size_t b = 0; b < blocks_.size(); ++b) {
+      for (int k = 0; k < blocks_[b].width * blocks_[b].height; ++k) {
+        const double light = static_cast<double>(paths_[b].beauty[static_cast<std::size_t>(k)].mean());
+        all_light += light;
+        const EyeRay ray =
+            camera.ray(blocks_[b].x0 + k % blocks_[b].width + 0.5, blocks_[b].y0 + k / blocks_[b].width + 0.5);
+        const std::optional<ShellHit> hit = fibers.first_fiber({ray.origin, ray.direction});
+        if (!hit || fibers.meets_mesh(ray.origin, ray.direction, hit->t)) continue;
+        const std::size_t cloth = cloth_of_fibers[hit->cloth];
+        SeenCloth& seen = plan_.seen[cloth];
+        seen.share += 1;
+        seen.light_share += light;
+        seen.footprint_mm += std::log(ray.spread * hit->t);
+        for (std::size_t l = 0; l < lights_.size(); ++l) {
+          facing[cloth][l] += std::max(0.0, static_cast<double>(fibers.fabric_direction(*hit, lights_[l].axis).z()));
+        }
+      }
+    }
+    for (std::size_t cloth = 0; cloth < scene.cloths.size(); ++cloth) {
+      SeenCloth& seen = plan_.seen[cloth];
+      if (!(seen.share > 0)) continue;
+      seen.footprint_mm = std::exp(seen.footprint_mm / seen.share);
+      double all = 0;
+      for (std::size_t l = 0; l < lights_.size(); ++l) {
+        // Soft light comes from beside its axis too.
+        const double weight =
+            static_cast<double>(lights_[l].irradiance.mean()) * std::max(0.05, facing[cloth][l] / seen.share);
+        const double sharpness =
+            lights_[l].is_directional() ? kDirectionalSharpness : static_cast<double>(lights_[l].sharpness);
+        lights_of_cloth_[cloth].push_back({sharpness, weight});
+        all += weight;
+      }
+      for (LightShare& light : lights_of_cloth_[cloth]) light.weight = all > 0 ? light.weight / all : 0;
+      seen.share /= pilot_pixels_;
+      seen.light_share = all_light > 0 ? seen.light_share / all_light : 0;
+    }
+  }
+
+  bool is_seen_fibers(std::size_t cloth) const {
+    return !plan_.scene.cloths[cloth].surface && plan_.seen[cloth].share > 0;
+  }
+
+  // --- Tables ----------------------------------------------------------------------------------------------------------------
+
+  void find_fabrics() {
+    for (const ClothConfig& cloth : plan_.scene.cloths) {
+      if (cloth.surface || fabric_of(cloth.fabric) != nullptr) continue;
+      auto fabric = std::make_unique<Fabric>();
+      fabric->file = cloth.fabric;
+      const auto own = std::make_unique<FabricStages>(cloth.fabric, *context_);
+      fabric->name = own->document().config.name;
+      fabric->order = own->document().transfer.order;
+      fabrics_.push_back(std::move(fabric));
+    }
+  }
+
+  Fabric* fabric_of(const fs::path& file) const {
+    for (const auto& fabric : fabrics_) {
+      if (fabric->file == file) return fabric.get();
+    }
+    return nullptr;
+  }
+
+  FabricStages& stages_of(Fabric& fabric, const FabricVariant& variant) {
+    std::unique_ptr<FabricStages>& stages = fabric.stages[variant];
+    if (!stages) stages = std::make_unique<FabricStages>(fabric.file, *context_, variant);
+    return *stages;
+  }
+
+  /// False where some table is missing and path tracing is cheaper than to measure it.
+  bool read_tables() {
+    const Stopwatch watch;
+    const bool all_there = have_tables();
+    loading_ = loading_ + watch.elapsed();
+    return all_there;
+  }
+  bool have_tables() {
+    const std::optional<Offer> traced =
+        offer(plan_.ways[0].candidate, plan_.question.tolerance, plan_.question.pictures);
+    const double samples = traced ? static_cast<double>(traced->spp) * pixels_ * plan_.question.pictures : INFINITY;
+    for (const auto& fabric : fabrics_) {
+      FabricStages& stages = stages_of(*fabric, {});
+      if (!fs::exists(stages.accuracy_place().path) && samples < kTableSamples) {
+        plan_.note = fmt::format(
+            "nothing is known of what else {} allows: path tracing takes less time than measuring it (heddle accuracy)",
+            fabric->name);
+        return false;
+      }
+      fabric->table = read_accuracy(stages.accuracy().path);
+    }
+    for (const ClothConfig& cloth : plan_.scene.cloths) {
+      if (!cloth.far_surface) continue;
+      FabricStages& stages = stages_of(*fabric_of(cloth.fabric), {});
+      surfaces_.try_emplace(surface_key(cloth), read_accuracy(stages.accuracy(&*cloth.far_surface).path));
+    }
+    return true;
+  }
+
+  static std::pair<fs::path, std::string> surface_key(const ClothConfig& cloth) {
+    return {cloth.fabric, cloth.far_surface->text};
+  }
+
+  // --- Ways ------------------------------------------------------------------------------------------------------------------
+
+  void add_path() {
+    Way way;
+    way.family = "path";
+    way.method = RenderMethod::kPath;
+    way.tried = true;
+    way.candidate = {.name = "path",
+                     .bias_square = {},
+                     .noise_square = relative(path_variance_),
+                     .setup_seconds = path_setup_,
+                     .seconds_per_spp = path_seconds_per_spp_,
+                     .spp_step = 2};
+    plan_.ways.push_back(std::move(way));
+  }
+
+  /// How the farthest cloths may be surfaces: none, the farthest, the two farthest, ...
+  std::vector<std::set<std::size_t>> stand_ins() const {
+    std::vector<std::size_t> cloths;
+    for (std::size_t k = 0; k < plan_.scene.cloths.size(); ++k) {
+      if (plan_.scene.cloths[k].far_surface && is_seen_fibers(k)) cloths.push_back(k);
+    }
+    std::sort(cloths.begin(), cloths.end(),
+              [&](std::size_t a, std::size_t b) { return plan_.seen[a].footprint_mm > plan_.seen[b].footprint_mm; });
+    std::vector<std::set<std::size_t>> sets(1);
+    for (const std::size_t cloth : cloths) {
+      sets.push_back(sets.back());
+      sets.back().insert(cloth);
+    }
+    return sets;
+  }
+
+  /// Forms of visibility that the scene's lights tell apart.
+  std::vector<std::pair<std::string, VisibilityBlend>> forms() const {
+    std::vector<std::pair<std::string, VisibilityBlend>> list = {{"", VisibilityBlend{}}};
+    const VisibilityBlend usual;
+    bool any_by_lobes = false;
+    bool any_by_distance = false;
+    for (const Light& light : lights_) {
+      if (light.is_directional()) continue;
+      any_by_lobes = any_by_lobes || usual.uses_lobes(light.sharpness);
+      any_by_distance = any_by_distance || usual.uses_distance(light.sharpness);
+    }
+    if (any_by_lobes) list.emplace_back(kDistanceSetting, kSignedDistanceOnly);
+    if (any_by_distance) list.emplace_back(kGaussiansSetting, kLobesOnly);
+    return list;
+  }
+
+  void add_other_ways() {
+    for (const std::set<std::size_t>& far : stand_ins()) {
+      SceneVariant variant;
+      variant.stand_ins = far;
+      if (!far.empty()) add_way(RenderMethod::kPath, variant);
+      add_way(RenderMethod::kPath6, variant);
+      add_way(RenderMethod::kDualScattering, variant);
+      for (const auto& [form, blend] : forms()) {
+        variant.blend = blend;
+        for (const RenderMethod method : {RenderMethod::kExact, RenderMethod::kVolume}) {
+          for (const SceneVariant& of_fabrics : fabric_choices(method, variant)) add_way(method, of_fabrics);
+        }
+      }
+    }
+  }
+
+  /// Every choice of cells, order and voxels for every fabric. The order, which matters least, only where there is one fabric; and
+  /// many fabrics all alike.
+  std::vector<SceneVariant> fabric_choices(RenderMethod method, const SceneVariant& base) const {
+    std::vector<SceneVariant> choices = {base};
+    const bool alike = fabrics_.size() > kMostApart;
+    for (const auto& fabric : fabrics_) {
+      std::vector<SceneVariant::OfFabric> of_one;
+      const auto add = [&](std::optional<int> order, double cells, double voxels) {
+        of_one.push_back({order, {.cell_size = cells, .voxel_rate = voxels}});
+      };
+      std::vector<double> cells = {1};
+      cells.insert(cells.end(), std::begin(kOtherCells), std::end(kOtherCells));
+      std::vector<double> voxels = {1};
+      if (method == RenderMethod::kVolume)
+        voxels.insert(voxels.end(), std::begin(kOtherVoxels), std::end(kOtherVoxels));
+      for (const double v : voxels) {
+        for (const double c : cells) {
+          add({}, c, v);
+          for (const int order : kOtherOrders) {
+            if (order < fabric->order && fabrics_.size() == 1) add(order, c, v);
+          }
+        }
+      }
+      std::vector<SceneVariant> longer;
+      for (const SceneVariant& choice : choices) {
+        for (const SceneVariant::OfFabric& one : of_one) {
+          if (alike && !choice.fabrics.empty() && choice.fabrics.begin()->second != one) continue;
+          longer.push_back(choice);
+          longer.back().fabrics[fabric->file] = one;
+        }
+      }
+      choices = std::move(longer);
+    }
+    return choices;
+  }
+
+  /// Names of table settings whose differences from `base` add up.
+  struct Settings {
+    std::string base;
+    std::vector<std::pair<std::string, std::string>> changes;  // (setting, of which setting it is a change)
+  };
+  Settings settings_of(RenderMethod method, const SceneVariant& variant,
+                       const SceneVariant::OfFabric& of_fabric) const {
+    Settings settings{render_method_name(method), {}};
+    if (method != RenderMethod::kExact && method != RenderMethod::kVolume) return settings;
+    if (variant.blend == kSignedDistanceOnly) settings.changes.emplace_back(kDistanceSetting, "exact");
+    if (variant.blend == kLobesOnly) settings.changes.emplace_back(kGaussiansSetting, "exact");
+    if (of_fabric.order) settings.changes.emplace_back(order_setting(*of_fabric.order), "exact");
+    if (of_fabric.variant.cell_size != 1)
+      settings.changes.emplace_back(cells_setting(of_fabric.variant.cell_size), "exact");
+    if (of_fabric.variant.voxel_rate != 1)
+      settings.changes.emplace_back(voxels_setting(of_fabric.variant.voxel_rate), "volume");
+    return settings;
+  }
+
+  /// What a table says of one cloth: squares relative to the cloth's own light, noise and time relative to path tracing.
+  struct OfCloth {
+    Estimate bias_square;
+    double noise_ratio = 1;
+    double time_ratio = 1;
+    double setup_seconds = 0;
+  };
+  OfCloth ask(const AccuracyTable& table, const Settings& settings, std::size_t cloth) const {
+    const double footprint = plan_.seen[cloth].footprint_mm;
+    double together = 0;  // of biases, if they are the same everywhere
+    double apart = 0;     // of their squares, if they have nothing to do with each other
+    double error = 0;
+    double noise = 0;
+    double path_noise = 0;
+    for (const LightShare& light : lights_of_cloth_[cloth]) {
+      const auto at = [&](const std::string& setting) { return table.at(setting, light.sharpness, footprint); };
+      const Accuracy base = at(settings.base);
+      double square = base.bias_square;
+      for (const auto& [setting, of] : settings.changes) square += at(setting).bias_square - at(of).bias_square;
+      square = std::max(0.0, square);
+      // What folds add to a flat swatch seen from as far.
+      if (plan_.scene.cloths[cloth].mesh) {
+        const double flat = table.at(settings.base, light.sharpness, table.bent_footprint_mm).bias_square;
+        const Accuracy bent = table.at_bent(settings.base, light.sharpness);
+        square += std::max(0.0, bent.bias_square - std::max(0.0, flat));
+        error += light.weight * light.weight * bent.bias_square_error;
+      }
+      const double weight = light.weight * light.weight;
+      together += light.weight * std::sqrt(square);
+      apart += weight * square;
+      error += weight * base.bias_square_error;
+      noise += weight * base.noise_square;
+      path_noise += weight * at("path").noise_square;
+    }
+    OfCloth result;
+    const double square = 0.5 * (together * together + apart);
+    result.bias_square = {square, std::hypot(error, kTableError * square)};
+    if (path_noise > 0) result.noise_ratio = noise / path_noise;
+    double seconds = table.setting(settings.base).seconds_per_sample;
+    for (const auto& [setting, of] : settings.changes) {
+      seconds *= table.setting(setting).seconds_per_sample / table.setting(of).seconds_per_sample;
+    }
+    result.time_ratio = seconds / table.setting("path").seconds_per_sample;
+    result.setup_seconds = table.setting(settings.base).setup_seconds;
+    return result;
+  }
+
+  void add_way(RenderMethod method, const SceneVariant& variant) {
+    Way way;
+    way.method = method;
+    way.variant = variant;
+    way.family = render_method_name(method);
+    if (!variant.stand_ins.empty()) way.family += " + surfaces";
+    Candidate& candidate = way.candidate;
+    candidate.name = name_of(way);
+    candidate.spp_step = traces_paths(method) ? 2 : 1;
+    double noise = 0;
+    double noise_weight = 0;
+    double time = 0;
+    double seen = 0;
+    std::set<fs::path> set_up;
+    for (std::size_t k = 0; k < plan_.scene.cloths.size(); ++k) {
+      if (!is_seen_fibers(k)) continue;
+      const ClothConfig& cloth = plan_.scene.cloths[k];
+      const SeenCloth& of = plan_.seen[k];
+      OfCloth answer;
+      if (variant.stand_ins.contains(k)) {
+        answer = ask(surfaces_.at(surface_key(cloth)), {surface_setting(cloth.far_surface->name), {}}, k);
+      } else {
+        answer = ask(*fabric_of(cloth.fabric)->table, settings_of(method, variant, variant.of(cloth.fabric)), k);
+      }
+      // The cloth's light, squared, relative to the picture's: (light_share / share)^2, on `share` of the pixels.
+      const double weight = of.light_share * of.light_share / of.share;
+      candidate.bias_square.value += weight * answer.bias_square.value;
+      candidate.bias_square.error += weight * answer.bias_square.error;
+      noise += weight * answer.noise_ratio;
+      noise_weight += weight;
+      time += of.share * answer.time_ratio;
+      seen += of.share;
+      if (set_up.insert(cloth.fabric).second) {
+        candidate.setup_seconds += answer.setup_seconds * static_cast<double>(std::max<std::size_t>(1, lights_.size()));
+      }
+    }
+    const double noise_ratio = noise_weight > 0 ? noise / noise_weight : 1;
+    const Estimate traced = relative(path_variance_);
+    candidate.noise_square = {noise_ratio * traced.value, noise_ratio * std::hypot(traced.error, 0.2 * traced.value)};
+    candidate.seconds_per_spp = path_seconds_per_spp_ * (seen > 0 ? time / seen : 1);
+    candidate.build_seconds = build_seconds(way);
+    plan_.ways.push_back(std::move(way));
+  }
+
+  /// Fabrics that a way still draws by their fibers.
+  bool draws_fibers(const Way& way, const fs::path& file) const {
+    for (std::size_t k = 0; k < plan_.scene.cloths.size(); ++k) {
+      const ClothConfig& cloth = plan_.scene.cloths[k];
+      if (!cloth.surface && cloth.fabric == file && !way.variant.stand_ins.contains(k)) return true;
+    }
+    return false;
+  }
+
+  double build_seconds(const Way& way) {
+    double sum = 0;
+    for (const auto& fabric : fabrics_) {
+      if (!draws_fibers(way, fabric->file)) continue;
+      const SceneVariant::OfFabric of = way.variant.of(fabric->file);
+      Needs needs = needs_of(way.method, plan_.scene.lights, way.variant.blend);
+      needs.order = of.order;
+      for (const StageCost& cost : stages_of(*fabric, of.variant).costs(needs)) {
+        if (!cost.present) sum += predicted_seconds(*fabric->table, cost.stage, of);
+      }
+    }
+    return sum;
+  }
+
+  static double predicted_seconds(const AccuracyTable& table, const std::string& stage,
+                                  const SceneVariant::OfFabric& of) {
+    const auto seconds_of = [&](const std::string& part) {
+      const auto found = table.costs.find(part);
+      if (found == table.costs.end()) return 0.0;
+      return table.threads == working_threads() ? found->second.seconds
+                                                : found->second.core_seconds / working_threads();
+    };
+    if (stage == "voxelize" && of.variant.voxel_rate != 1)
+      return seconds_of(stage + ", " + voxels_setting(of.variant.voxel_rate));
+    double seconds = seconds_of(stage);
+    if (stage != "transfer" || !(seconds > 0)) return seconds;
+    if (of.variant.cell_size != 1) seconds = seconds_of(stage + ", " + cells_setting(of.variant.cell_size));
+    if (of.order) seconds *= seconds_of(stage + ", " + order_setting(*of.order)) / seconds_of(stage);
+    return seconds;
+  }
+
+  std::string name_of(const Way& way) const {
+    std::string name = render_method_name(way.method);
+    if (way.method == RenderMethod::kExact || way.method == RenderMethod::kVolume) {
+      if (way.variant.blend == kSignedDistanceOnly) name += fmt::format(", {}", kDistanceSetting);
+      if (way.variant.blend == kLobesOnly) name += fmt::format(", {}", kGaussiansSetting);
+      for (const auto& fabric : fabrics_) {
+        if (!draws_fibers(way, fabric->file)) continue;
+        const SceneVariant::OfFabric of = way.variant.of(fabric->file);
+        const std::string of_which = fabrics_.size() > 1 ? fabric->file.stem().string() + " " : "";
+        if (of.variant.cell_size != 1) name += ", " + of_which + cells_setting(of.variant.cell_size);
+        if (of.order) name += ", " + of_which + order_setting(*of.order);
+        if (of.variant.voxel_rate != 1) name += ", " + of_which + voxels_setting(of.variant.voxel_rate);
+      }
+    }
+    for (const std::size_t k : way.variant.stand_ins) {
+      name += fmt::format(", cloth {} as {}", k + 1, plan_.scene.cloths[k].far_surface->name);
+    }
+    return name;
+  }
+
+  // --- The choice ------------------------------------------------------------------------------------------------------------
+
+  std::vector<Candidate> candidates() const {
+    std::vector<Candidate> list;
+    for (const Way& way : plan_.ways) list.push_back(way.candidate);
+    return list;
+  }
+
+  void settle() {
+    const double tolerance = plan_.question.tolerance;
+    const int pictures = plan_.question.pictures;
+    for (int tries = 0; tries < kMostTries; ++tries) {
+      plan_.chosen = cheapest(candidates(), tolerance, pictures);
+      if (!plan_.chosen) break;
+      if (!learn(plan_.ways[*plan_.chosen], *offer(plan_.ways[*plan_.chosen].candidate, tolerance, pictures))) break;
+    }
+    plan_.chosen = cheapest(candidates(), tolerance, pictures);
+    if (!plan_.chosen) return;
+    const Way& way = plan_.ways[*plan_.chosen];
+    plan_.offer = offer(way.candidate, tolerance, pictures);
+    plan_.request.method = way.method;
+    plan_.request.spp = plan_.offer->spp;
+  }
+
+  /// Finds out more of the way that looks cheapest; false where there is nothing to find out.
+  bool learn(Way& way, const Offer& offered) {
+    if (way.family == "path") {
+      const double planned = pixels_ * offered.spp * plan_.question.pictures;
+      const double error = way.candidate.noise_square.error / way.candidate.noise_square.value;
+      const double done = pilot_pixels_ * path_spp_;
+      // Four times the samples, twice as sure; no more than the share.
+      const double wanted = std::min(kPilotShare * planned, 16 * done);
+      if (error < kNoiseKnown || wanted < 2 * done) return false;
+      const double pixels = std::min(pixels_, wanted / kPilotSamples);
+      trace_pilot(static_cast<int>(pixels), 2 * std::max(kPilotSamples / 2, static_cast<int>(wanted / pixels / 2)));
+      way.candidate.noise_square = relative(path_variance_);
+      way.candidate.seconds_per_spp = path_seconds_per_spp_;
+      return true;
+    }
+    if (way.tried) return false;
+    if (way.candidate.build_seconds > 0 && !plan_.question.may_build) return false;
+    try_out(way);
+    return true;
+  }
+
+  void try_out(Way& way) {
+    if (way.variant != SceneVariant{}) {
+      if (!other_job_ || way.variant != other_variant_) {
+        const Stopwatch watch;
+        other_job_.reset();  // one at a time in memory
+        other_job_ = std::make_unique<SceneJob>(plan_.question.scene, *context_, way.variant);
+        other_variant_ = way.variant;
+        loading_ = loading_ + watch.elapsed();
+      }
+    }
+    SceneJob& job = way.variant == SceneVariant{} ? *job_ : *other_job_;
+    const SceneJob::Crops crops = shoot(job, pilot_request(way.method, kPilotSamples));
+    const Candidate before = way.candidate;
+    Candidate& now = way.candidate;
+    now.noise_square = relative(sample_variance(crops.frames));
+    now.seconds_per_spp = seconds_per_spp(crops, kPilotSamples);
+    now.setup_seconds = crops.setup.seconds;
+    now.build_seconds = 0;  // by now it is there
+    Estimate measured = relative(squared_bias(crops.frames, paths_));
+    // A few pixels hold most of the squares, and a pilot misses more of them than it meets: it may raise what the table says, not
+    // lower it.
+    measured.error = std::max(measured.error, kPilotError * std::abs(measured.value));
+    const Estimate both = combined(before.bias_square, measured);
+    if (before.bias_square.error > 0 && both.value > before.bias_square.value) now.bias_square = both;
+    way.tried = true;
+    // What differs from the table here does so for the like of it too.
+    const double noise_ratio = now.noise_square.value / before.noise_square.value;
+    const double time_ratio = now.seconds_per_spp / before.seconds_per_spp;
+    const double more_bias = now.bias_square.value - before.bias_square.value;
+    for (Way& other : plan_.ways) {
+      if (other.tried || other.family != way.family) continue;
+      Candidate& like = other.candidate;
+      like.noise_square = {like.noise_square.value * noise_ratio,
+                           like.noise_square.value * now.noise_square.error / now.noise_square.value};
+      like.seconds_per_spp *= time_ratio;
+      like.setup_seconds = now.setup_seconds;
+      like.bias_square.value = std::max(0.0, like.bias_square.value + more_bias);
+      like.build_seconds = build_seconds(other);
+    }
+  }
+
+  StageContext* context_;
+  std::unique_ptr<SceneJob> job_;        // of the scene as it is
+  std::unique_ptr<SceneJob> other_job_;  // of other_variant_
+  SceneVariant other_variant_;
+  ScenePlan plan_;
+  double pixels_ = 0;                                     // of the picture
+  WorkTime loading_;  // and building
+  std::vector<Light> lights_;                             // environments as Gaussians
+  std::vector<std::vector<LightShare>> lights_of_cloth_;  // [cloth][light]
+  std::vector<std::unique_ptr<Fabric>> fabrics_;
+  std::map<std::pair<fs::path, std::string>, AccuracyTable> surfaces_;
+
+  std::vector<PixelRect> blocks_;
+  std::vector<FrameBuffers> paths_;  // [block]
+  double pilot_pixels_ = 0;
+  int path_spp_ = 0;
+  double path_setup_ = 0;
+  double path_seconds_per_spp_ = 0;
+  Estimate path_variance_;  // absolute
+  Estimate mean_;           // radiance
+};
+
+}  // namespace
+
+ScenePlan make_plan(const PlanQuestion& question, StageContext& context) {
+  return ScenePlanner(question, context).make();
+}
+
+}  // namespace heddle

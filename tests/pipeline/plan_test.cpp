@@ -1,0 +1,321 @@
+// Plans: arithmetic on hand-made candidates, statistics on frames of known noise and bias, tables.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <random>
+#include <sstream>
+
+#include "formats/input_error.h"
+#include "pipeline/plan/accuracy_table.h"
+#include "pipeline/plan/measure_accuracy.h"
+#include "pipeline/plan/planner.h"
+#include "pipeline/plan/probe.h"
+#include "pipeline/stages.h"
+#include "render/pixel_sums.h"
+#include "tests/pipeline/small_fabric.h"
+#include "tests/support/temporary_folder.h"
+
+namespace heddle {
+namespace {
+
+Candidate candidate(const std::string& name, double bias, double noise, double build, double per_spp, int step = 1) {
+  return {.name = name,
+          .bias_square = {bias * bias, 0},
+          .noise_square = {noise * noise, 0},
+          .build_seconds = build,
+          .setup_seconds = 0.1,
+          .seconds_per_spp = per_spp,
+          .spp_step = step};
+}
+
+const std::vector<Candidate> kCandidates = {candidate("path", 0, 4, 0, 0.05, 2), candidate("fast", 0.1, 1, 3, 0.01),
+                                            candidate("coarse", 0.3, 1, 0.5, 0.01)};
+
+TEST(Plan, SamplesMakeUpForWhatTheBiasLeaves) {
+  const std::optional<Offer> made = offer(kCandidates[1], 0.2, 5);
+  ASSERT_TRUE(made);
+  // The error as promised is within the tolerance, and with two thirds of the samples it would not be.
+  EXPECT_LE(std::hypot(0.1, 1 / std::sqrt(made->spp)), 0.2);
+  EXPECT_GT(std::hypot(0.1, 1 / std::sqrt(made->spp / 1.5)), 0.2);
+  EXPECT_DOUBLE_EQ(made->expected_error, std::hypot(0.1, 1 / std::sqrt(made->spp)));
+  EXPECT_DOUBLE_EQ(made->seconds_per_picture, 0.1 + 0.01 * made->spp);
+  EXPECT_DOUBLE_EQ(made->seconds, 3 + 5 * made->seconds_per_picture);
+}
+
+TEST(Plan, PathsComeInPairs) {
+  for (const double tolerance : {0.01, 0.03, 0.2, 1.0, 30.0}) {
+    const std::optional<Offer> made = offer(kCandidates[0], tolerance, 1);
+    ASSERT_TRUE(made);
+    EXPECT_EQ(made->spp % 2, 0);
+    EXPECT_GE(made->spp, 2);
+  }
+}
+
+TEST(Plan, WhatIsNotKnownCostsSamples) {
+  Candidate sure = kCandidates[1];
+  Candidate unsure = sure;
+  unsure.bias_square.error = unsure.bias_square.value;
+  EXPECT_GT(offer(unsure, 0.2, 1)->spp, offer(sure, 0.2, 1)->spp);
+  unsure = sure;
+  unsure.noise_square.error = unsure.noise_square.value;
+  EXPECT_GT(offer(unsure, 0.2, 1)->spp, offer(sure, 0.2, 1)->spp);
+}
+
+TEST(Plan, CheapestThatIsGoodEnough) {
+  const auto name_at = [](double tolerance, int pictures) {
+    return kCandidates[cheapest(kCandidates, tolerance, pictures).value()].name;
+  };
+  EXPECT_EQ(name_at(2, 1), "path");  // a few samples: nothing is worth building
+  EXPECT_EQ(name_at(0.4, 1), "coarse");
+  EXPECT_EQ(name_at(0.15, 1), "fast");
+  EXPECT_EQ(name_at(0.4, 100), "fast");  // what it costs to build is shared
+  EXPECT_EQ(name_at(0.09, 1), "path");   // no other is near enough
+}
+
+TEST(Plan, TighterTolerancesNeverGetCheaper) {
+  for (const int pictures : {1, 10, 1000}) {
+    double before = 0;
+    for (double tolerance = 3; tolerance > 0.005; tolerance *= 0.93) {
+      const std::optional<std::size_t> best = cheapest(kCandidates, tolerance, pictures);
+      ASSERT_TRUE(best);
+      const Offer made = *offer(kCandidates[*best], tolerance, pictures);
+      EXPECT_GE(made.seconds, before) << tolerance;
+      EXPECT_LE(made.expected_error, tolerance);
+      before = made.seconds;
+      for (const Candidate& other : kCandidates) {
+        const std::optional<Offer> offered = offer(other, tolerance, pictures);
+        EXPECT_TRUE(!offered || offered->seconds >= made.seconds) << other.name;
+      }
+    }
+  }
+}
+
+TEST(Plan, SaysWhatIsOutOfReach) {
+  const std::vector<Candidate> fast = {kCandidates[1], kCandidates[2]};
+  EXPECT_FALSE(cheapest(fast, 0.1, 1));
+  const double best = best_tolerance(fast);
+  EXPECT_GT(best, 0.1);
+  EXPECT_TRUE(cheapest(fast, 1.001 * best, 1));
+  EXPECT_FALSE(cheapest(fast, 0.999 * best, 1));
+  EXPECT_FALSE(cheapest(kCandidates, 1e-6, 1)) << "more samples than are ever taken";
+}
+
+TEST(Plan, EstimatesCountByWhatIsKnownOfThem) {
+  const Estimate both = combined({1, 0.1}, {3, 0.2});
+  EXPECT_NEAR(both.value, (1 * 4 + 3 * 1) / 5.0, 1e-12);
+  EXPECT_NEAR(both.error, std::sqrt(0.01 * 0.8), 1e-12);
+  EXPECT_EQ(combined({1, 0}, {3, 0.2}).value, 1);
+}
+
+TEST(Probe, BlocksLieInsideAndApart) {
+  const PixelRect rectangle{3, 5, 61, 30};
+  for (const int pixels : {1, 300, 100000}) {
+    std::vector<int> covered(100 * 100, 0);
+    int count = 0;
+    for (const PixelRect& block : spread_blocks(rectangle, 8, pixels)) {
+      for (int y = block.y0; y < block.y0 + block.height; ++y) {
+        for (int x = block.x0; x < block.x0 + block.width; ++x) {
+          ASSERT_TRUE(3 <= x && x < 64 && 5 <= y && y < 35);
+          EXPECT_EQ(covered[static_cast<std::size_t>(100 * y + x)]++, 0);
+          ++count;
+        }
+      }
+    }
+    EXPECT_NEAR(count, std::min(pixels, 61 * 30), pixels < 61 * 30 ? 64 : 0);
+  }
+}
+
+TEST(Probe, BlocksReachAllOfAPicture) {
+  // A quarter of the blocks: every quadrant holds about a quarter of them.
+  int quadrants[4] = {};
+  for (const PixelRect& block : spread_blocks({0, 0, 256, 256}, 8, 128 * 128)) {
+    ++quadrants[(block.x0 >= 128) + 2 * (block.y0 >= 128)];
+  }
+  for (const int blocks : quadrants) EXPECT_NEAR(blocks, 64, 13);
+}
+
+/// Blocks of pixels whose eye rays bring noise that both pictures share, and each a noise of its own.
+struct Drawn {
+  std::vector<FrameBuffers> reference;
+  std::vector<FrameBuffers> picture;
+};
+Drawn draw(double bias, double shared, double own, int samples) {
+  std::mt19937 engine(7);
+  std::normal_distribution<double> normal;
+  Drawn drawn;
+  for (int block = 0; block < 64; ++block) {
+    FrameBuffers frames[2] = {FrameBuffers(8, 8), FrameBuffers(8, 8)};
+    for (FrameBuffers& frame : frames) {
+      frame.spp = samples;
+      frame.half0.resize(64);
+      frame.half1.resize(64);
+      frame.variance.resize(64);
+    }
+    for (std::size_t k = 0; k < 64; ++k) {
+      PixelSums sums[2];
+      // The same everywhere in a pixel, another sign in the next.
+      const double pixel_bias = k % 2 == 0 ? bias : -bias;
+      for (int s = 0; s < samples; ++s) {
+        const double common = 1 + shared * normal(engine);
+        for (int p = 0; p < 2; ++p) {
+          const auto value = static_cast<float>(common + own * normal(engine) + p * pixel_bias);
+          sums[p].add({Rgb(value, value, value), Rgb::Zero(), Rgb::Zero(), 1}, s);
+        }
+      }
+      for (int p = 0; p < 2; ++p) sums[p].store(samples, k, frames[p]);
+    }
+    drawn.reference.push_back(frames[0]);
+    drawn.picture.push_back(frames[1]);
+  }
+  return drawn;
+}
+
+TEST(ProbeStatistical, NoiseIsTheVarianceOfASample) {
+  const Drawn drawn = draw(0.3, 0.8, 0.6, 8);
+  const Estimate variance = sample_variance(drawn.picture);
+  EXPECT_NEAR(variance.value, 1.0, 4 * variance.error);
+  EXPECT_LT(variance.error, 0.03);
+  EXPECT_NEAR(mean_radiance(drawn.picture), 1.0, 4 / std::sqrt(64.0 * 64 * 8));
+}
+
+TEST(ProbeStatistical, BiasIsFoundUnderNoise) {
+  for (const double bias : {0.0, 0.1, 0.3}) {
+    const Drawn drawn = draw(bias, 5.0, 0.5, 8);
+    const Estimate square = squared_bias(drawn.picture, drawn.reference);
+    EXPECT_NEAR(square.value, bias * bias, 4 * square.error) << bias;
+    EXPECT_LT(square.error, 0.01) << "noise of common eye rays drops out";
+  }
+}
+
+AccuracyTable small_table() {
+  AccuracyTable table;
+  table.fabric = "cloth \"of\" gold";
+  table.key = "0123";
+  table.threads = 2;
+  table.sharpness = {10, 1000};
+  table.footprint_mm = {0.1, 0.4};
+  const auto entry = [](double bias) { return Accuracy{bias, 0.01, 2 * bias, Rgbd(1, 0.9, 1.1)}; };
+  table.bent_footprint_mm = 3;
+  table.settings = {{"path", 1e-5, 0.5, {entry(0), entry(0), entry(0), entry(0)}, {entry(0), entry(0)}},
+                    {"exact", 1e-6, 0.25, {entry(1), entry(2), entry(3), entry(4)}, {entry(5), entry(7)}}};
+  table.costs = {{"maps", {1.5, 3.0}}, {"transfer, cells x 2", {2.5, 5.0}}};
+  return table;
+}
+
+TEST(AccuracyTable, BetweenEntriesInLogarithms) {
+  const AccuracyTable table = small_table();
+  EXPECT_DOUBLE_EQ(table.at("exact", 10, 0.1).bias_square, 1);
+  EXPECT_NEAR(table.at("exact", 10, 0.2).bias_square, 1.5, 1e-12);
+  EXPECT_NEAR(table.at("exact", 100, 0.2).bias_square, 2.5, 1e-12);
+  EXPECT_DOUBLE_EQ(table.at("exact", 0, 0.001).bias_square, 1) << "the nearest entry beyond the ends";
+  EXPECT_DOUBLE_EQ(table.at("exact", kDirectionalSharpness, 10).bias_square, 4);
+  EXPECT_THROW(table.at("no such", 10, 0.1), FileError);
+}
+
+TEST(AccuracyTableFormat, RoundTrip) {
+  const TemporaryFolder folder;
+  const std::filesystem::path path = folder.path() / "table.json";
+  write_accuracy(path, small_table());
+  EXPECT_EQ(accuracy_json(read_accuracy(path)), accuracy_json(small_table()));
+  EXPECT_NE(accuracy_text(small_table()).find("exact"), std::string::npos);
+}
+
+TEST(AccuracyTableFormat, DamagedTablesAreRefused) {
+  const TemporaryFolder folder;
+  const std::filesystem::path path = folder.path() / "table.json";
+  const std::string whole = accuracy_json(small_table()).dump(1) + "\n";
+  for (std::size_t size = 0; size + 2 < whole.size(); size += 7) {
+    std::ofstream(path, std::ios::trunc) << whole.substr(0, size);
+    EXPECT_THROW(read_accuracy(path), FileError) << size;
+  }
+  for (const auto& [from, to] : {std::pair<std::string, std::string>{"\"version\": 1", "\"version\": 99"},
+                                 {"heddle accuracy", "heddle chart"},
+                                 {"1000.0", "10.0"},
+                                 {"\"threads\": 2", "\"threads\": \"2\""}}) {
+    std::string damaged = whole;
+    ASSERT_NE(damaged.find(from), std::string::npos) << from;
+    std::ofstream(path, std::ios::trunc) << damaged.replace(damaged.find(from), from.size(), to);
+    EXPECT_THROW(read_accuracy(path), FileError) << to;
+  }
+}
+
+TEST(CutToOrder, KeepsTheLowBands) {
+  Transfer transfer;
+  transfer.order = 3;
+  transfer.cell_of_segment = {0, 1};
+  transfer.paths = {8, 9};
+  for (int k = 0; k < 2 * 16 * 16 * 3; ++k) transfer.matrices.push_back(static_cast<float>(k % 97));
+  transfer.standard_error.assign(2 * 4 * 3, 1);
+  transfer.cones.emplace();
+  constexpr std::size_t kOnCones = ConeTransfer::kWidths * ConeTransfer::kAzimuths * 3;
+  transfer.cones->harmonics = transfer.matrices;
+  for (std::size_t k = 0; k < 2 * 16 * kOnCones; ++k) transfer.cones->moments.push_back(static_cast<float>(k % 89));
+  const Transfer cut = cut_to_order(transfer, 1);
+  EXPECT_EQ(cut.order, 1);
+  EXPECT_EQ(cut.matrices.size(), 2U * 4 * 4 * 3);
+  EXPECT_EQ(cut.standard_error.size(), 2U * 2 * 3);
+  // Light of the low bands only: the low bands of what arrives are the same.
+  std::vector<float> light(16, 0);
+  for (std::size_t j = 0; j < 4; ++j) light[j] = static_cast<float>(j + 1);
+  std::vector<float> whole(16 * 3);
+  std::vector<float> low(4 * 3);
+  for (const std::uint32_t cell : {0U, 1U}) {
+    transfer.incoming(cell, light.data(), whole.data());
+    cut.incoming(cell, light.data(), low.data());
+    for (std::size_t k = 0; k < low.size(); ++k) EXPECT_FLOAT_EQ(low[k], whole[k]) << cell;
+    transfer.incoming(cell, light.data(), 0.5F, whole.data());
+    cut.incoming(cell, light.data(), 0.5F, low.data());
+    for (std::size_t k = 0; k < low.size(); ++k) EXPECT_FLOAT_EQ(low[k], whole[k]) << cell;
+    std::vector<float> whole_cones(kOnCones);
+    std::vector<float> low_cones(kOnCones);
+    transfer.incoming_on_cones(cell, light.data(), whole_cones.data());
+    cut.incoming_on_cones(cell, light.data(), low_cones.data());
+    for (std::size_t k = 0; k < kOnCones; ++k) EXPECT_FLOAT_EQ(low_cones[k], whole_cones[k]) << cell;
+  }
+}
+
+/// The table of the small fabric, measured with little effort.
+AccuracyTable measured_table() {
+  const TemporaryFolder folder;
+  std::ofstream(folder.path() / "fabric.toml") << kSmallFabric;
+  std::ostringstream silent;
+  Console console(silent, false, true);
+  StageContext context{.cache = Cache(folder.path() / "cache"), .console = &console, .seed = {}, .results = {}};
+  FabricStages stages(folder.path() / "fabric.toml", context);
+  AccuracyData data;
+  data.pack = load_pack(stages.pack(kEverything).path);
+  return measure_accuracy(data, 1, [](double) {},
+                          {.pixels = 32, .bent_pixels = 8, .path_samples = 6, .method_samples = 2, .bent_factor = 4});
+}
+
+TEST(MeasureAccuracyStatistical, SaysWhatHoldsOfAnyFabric) {
+  const AccuracyTable table = measured_table();
+  for (std::size_t f = 1; f < table.footprint_mm.size(); ++f) {
+    EXPECT_NEAR(table.footprint_mm[f], 2 * table.footprint_mm[f - 1], 1e-9);
+  }
+  EXPECT_NEAR(table.footprint_mm[0], 0.02, 1e-5) << "the fibers' diameter";
+  EXPECT_FALSE(table.has(order_setting(3))) << "the fabric's own order is 2";
+  EXPECT_TRUE(table.has(order_setting(1)));
+  for (const double sharpness : table.sharpness) {
+    const auto at = [&](const char* setting, double footprint) { return table.at(setting, sharpness, footprint); };
+    for (const double footprint : table.footprint_mm) {
+      EXPECT_EQ(at("path", footprint).bias_square, 0);
+      EXPECT_GT(at("path", footprint).noise_square, at("exact", footprint).noise_square) << sharpness;
+      // Six events are too dark, and differ from all of them by what is missing.
+      EXPECT_LT(at("path-6", footprint).color_ratio.mean(), 1) << sharpness;
+    }
+    // A wider pixel sees more of the cloth's variety, and averages errors.
+    EXPECT_GE(at("exact", 1).noise_square, at("exact", 0.02).noise_square);
+    EXPECT_LT(at("exact", 1).bias_square, at("exact", 0.02).bias_square + 3 * at("exact", 0.02).bias_square_error);
+  }
+  // Light that both forms of visibility treat alike.
+  EXPECT_EQ(table.at("Gaussians", kDirectionalSharpness, 0.02).bias_square,
+            table.at("exact", kDirectionalSharpness, 0.02).bias_square);
+  EXPECT_EQ(table.at("signed distance", 1000, 0.02).bias_square, table.at("exact", 1000, 0.02).bias_square);
+  EXPECT_NE(table.at("signed distance", 3, 0.02).bias_square, table.at("exact", 3, 0.02).bias_square);
+}
+
+}  // namespace
+}  // namespace heddle
