@@ -235,7 +235,9 @@ Report describe(const fs::path& path, const CommonOptions& common) {
   if (extension == ".vdb") return describe_vdb(path);
   if (extension == ".exr") return describe_image(path);
   if (extension == ".obj") return describe_mesh(path);
-  throw FileError(path.string() + ": expected a pack, or a file that ends in .toml, .safetensors, .vdb, .exr or .obj, or the .json of an accuracy table");
+  throw FileError(path.string() +
+                  ": expected a pack, or a file that ends in .toml, .safetensors, .vdb, .exr or .obj, or the .json of "
+                  "an accuracy table");
 }
 
 void print_text(const Report& report) {

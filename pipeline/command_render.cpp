@@ -61,8 +61,9 @@ int render_within(double tolerance, const RenderOptions& options, Job& job) {
   const bool by_hand = !options.method.empty() || options.spp || options.seconds || options.local || options.bounces ||
                        options.order || !options.estimator.empty();
   if (by_hand) {
-    throw ConfigError("--tolerance chooses method, samples and data: not together with --method, --spp, --seconds, --local, "
-                      "--bounces, --estimator or --order");
+    throw ConfigError(
+        "--tolerance chooses method, samples and data: not together with --method, --spp, --seconds, --local, "
+        "--bounces, --estimator or --order");
   }
   const ScenePlan plan = make_plan({.scene = options.scene,
                                     .view = options.view,
@@ -83,9 +84,9 @@ int render_within(double tolerance, const RenderOptions& options, Job& job) {
   const double noise = relative_noise_of(picture.image)
                            .value_or(std::sqrt(std::max(0.0, way.candidate.noise_square.value) / plan.offer->spp));
   const double error = std::sqrt(bias_square + noise * noise);
-  const std::string done = fmt::format("{}, {} spp in {:.3g} s: expected error {:.3g} %, of that noise {:.3g} %, as the picture shows",
-                                       way.candidate.name, plan.offer->spp, picture.report.at("seconds").get<double>(),
-                                       100 * error, 100 * noise);
+  const std::string done = fmt::format(
+      "{}, {} spp in {:.3g} s: expected error {:.3g} %, of that noise {:.3g} %, as the picture shows",
+      way.candidate.name, plan.offer->spp, picture.report.at("seconds").get<double>(), 100 * error, 100 * noise);
   if (error > tolerance) {
     job.console().warn(done + fmt::format("; more than the {:.3g} % asked for", 100 * tolerance));
   } else {

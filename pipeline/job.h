@@ -24,7 +24,9 @@ class Job {
   StageContext& context() { return context_; }
   void add_artifact(const std::filesystem::path& path) { artifacts_.push_back(path); }
   /// One more entry of the JSON report.
-  void add_entry(const std::string& name, nlohmann::ordered_json value) { entries_.emplace_back(name, std::move(value)); }
+  void add_entry(const std::string& name, nlohmann::ordered_json value) {
+    entries_.emplace_back(name, std::move(value));
+  }
   /// Prints the report.
   void finish() const;
 

@@ -84,7 +84,9 @@ void add_order(CLI::App& command, std::optional<int>& order) {
 
 template <class Tolerance>
 CLI::Option* add_tolerance(CLI::App& command, int& pictures, const std::string& help, Tolerance& tolerance) {
-  command.add_option("--pictures", pictures, "With --tolerance: pictures that share the data, frames of a shot; 1 where absent")
+  command
+      .add_option("--pictures", pictures,
+                  "With --tolerance: pictures that share the data, frames of a shot; 1 where absent")
       ->check(CLI::Range(1, 1 << 20));
   return command.add_option("--tolerance", tolerance, help)->check(CLI::Range(1e-6, 100.0));
 }
@@ -122,7 +124,8 @@ std::map<std::string, std::function<int()>> add_commands(CLI::App& app, Options&
   add_stage_command(app, options, "visibility", "Visibility of every segment", StageTarget::kVisibility, true);
   add_stage_command(app, options, "transfer", "Indirect light transfer of every cell", StageTarget::kTransfer, true);
   add_stage_command(app, options, "pack", "The folder that a renderer opens", StageTarget::kPack, false);
-  add_stage_command(app, options, "accuracy", "What the methods are worth on a fabric: the table that plans are made from",
+  add_stage_command(app, options, "accuracy",
+                    "What the methods are worth on a fabric: the table that plans are made from",
                     StageTarget::kAccuracy, false);
   for (const char* name : {"precompute", "synth", "visibility", "transfer", "pack", "accuracy"}) {
     actions[name] = [&options] {
@@ -153,7 +156,8 @@ std::map<std::string, std::function<int()>> add_commands(CLI::App& app, Options&
       ->check(CLI::IsMember({"mis", "light", "bcsdf"}));
   add_order(*render, picture.order);
   add_tolerance(*render, picture.pictures,
-                "Relative RMSE per pixel, noise included: method, samples and data are chosen by a plan", picture.tolerance);
+                "Relative RMSE per pixel, noise included: method, samples and data are chosen by a plan",
+                picture.tolerance);
   actions["render"] = [&options] { return render_command(options.render, options.common); };
 
   CLI::App* evaluate =
@@ -177,9 +181,11 @@ std::map<std::string, std::function<int()>> add_commands(CLI::App& app, Options&
   CLI::App* plan = app.add_subcommand("plan", "The cheapest way to a picture that is good enough, and why");
   add_building(*plan, options);
   plan->add_option("SCENE.toml", options.plan.scene, "Scene config")->required();
-  add_tolerance(*plan, options.plan.pictures, "Relative RMSE per pixel, noise included: 0.05 is 5 %", options.plan.tolerance)
+  add_tolerance(*plan, options.plan.pictures, "Relative RMSE per pixel, noise included: 0.05 is 5 %",
+                options.plan.tolerance)
       ->required();
-  plan->add_option("--view", options.plan.view, "Name of one of the scene's [[view]] tables; its [camera] where absent");
+  plan->add_option("--view", options.plan.view,
+                   "Name of one of the scene's [[view]] tables; its [camera] where absent");
   plan->add_option("--crop,--cropwindow", options.plan.crop, "x0,y0,x1,y1 in pixels, x1 and y1 excluded")
       ->delimiter(',')
       ->expected(4);

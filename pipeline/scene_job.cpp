@@ -271,7 +271,9 @@ SceneJob::Crops SceneJob::render_crops(const PictureRequest& request, std::span<
   return result;
 }
 
-const ClothScene& SceneJob::fibers_scene() { return *loaded_for(RenderMethod::kPath).scene; }
+const ClothScene& SceneJob::fibers_scene() {
+  return *loaded_for(RenderMethod::kPath).scene;
+}
 
 PictureResult SceneJob::render(const PictureRequest& request, const std::string& title, bool quiet) {
   const std::string key = picture_key(request);

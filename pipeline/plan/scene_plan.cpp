@@ -605,7 +605,7 @@ class ScenePlanner {
   SceneVariant other_variant_;
   ScenePlan plan_;
   double pixels_ = 0;                                     // of the picture
-  WorkTime loading_;  // and building
+  WorkTime loading_;                                      // and building
   std::vector<Light> lights_;                             // environments as Gaussians
   std::vector<std::vector<LightShare>> lights_of_cloth_;  // [cloth][light]
   std::vector<std::unique_ptr<Fabric>> fabrics_;

@@ -63,7 +63,7 @@ struct ScenePlan {
   std::optional<std::size_t> chosen;  // of ways
   std::optional<Offer> offer;         // of the chosen one
   double best_tolerance = 0;          // that any way meets
-  WorkTime time;                 // that the plan took, without building data and loading the scene
+  WorkTime time;                      // that the plan took, without building data and loading the scene
   std::string note;                   // why no table was asked, or empty
 };
 

@@ -548,8 +548,15 @@ void store_table(const Workshop& shop, double bias) {
   add("dual-scattering", 1, 5, 1e-4);
   for (const char* name : {"exact", "signed distance", "cells x 2", "order 1"}) add(name, bias, 1, 1e-6);
   for (const char* name : {"volume", "voxels x 0.5", "Gaussians", "cells x 4"}) add(name, 2, 1, 1e-6);
-  for (const auto& [part, seconds] : std::map<std::string, double>{{"maps", 0.01}, {"ssdf", 0.01}, {"sg", 0.01}, {"transfer", 0.01},
-        {"transfer, cells x 2", 0.005}, {"transfer, cells x 4", 0.0025}, {"transfer, order 1", 0.01}, {"voxelize", 0.01}, {"voxelize, voxels x 0.5", 0.01}}) {
+  for (const auto& [part, seconds] : std::map<std::string, double>{{"maps", 0.01},
+                                                                   {"ssdf", 0.01},
+                                                                   {"sg", 0.01},
+                                                                   {"transfer", 0.01},
+                                                                   {"transfer, cells x 2", 0.005},
+                                                                   {"transfer, cells x 4", 0.0025},
+                                                                   {"transfer, order 1", 0.01},
+                                                                   {"voxelize", 0.01},
+                                                                   {"voxelize, voxels x 0.5", 0.01}}) {
     table.costs[part] = {seconds, seconds};
   }
   make_folder(path.parent_path());
@@ -570,7 +577,8 @@ TEST(PlanEndToEnd, SaysWhatItWouldDoAndBuildsNothing) {
   EXPECT_EQ(plan.at("choice").at("name"), "exact, signed distance, cells x 2");
   EXPECT_GT(plan.at("choice").at("build_seconds"), 0);
   EXPECT_LE(plan.at("choice").at("expected_error"), 0.4);
-  for (const char* stage : {"maps", "ssdf", "sg", "transfer", "voxelize"}) EXPECT_FALSE(fs::exists(shop / "cache" / stage)) << stage;
+  for (const char* stage : {"maps", "ssdf", "sg", "transfer", "voxelize"})
+    EXPECT_FALSE(fs::exists(shop / "cache" / stage)) << stage;
   const ProgramResult text = shop.run({"plan", "scene.toml", "--tolerance", "4e-1"});
   EXPECT_NE(text.out.find("choice    exact, signed distance, cells x 2"), std::string::npos) << text.out;
   EXPECT_NE(text.out.find("light 2   sg, sharpness 20: visibility by signed distances"), std::string::npos) << text.out;
@@ -619,7 +627,10 @@ TEST(RenderEndToEnd, WithinTheToleranceFromWhatWasPlanned) {
   } else {
     ADD_FAILURE() << "the table says that paths are dear: " << report.at("plan").dump(1);
   }
-  ASSERT_EQ(shop.run({"render", "scene.toml", "-o", "reference.exr", "--method", "path", "--spp", "256", "--seed", "77"}).status, 0);
+  ASSERT_EQ(
+      shop.run({"render", "scene.toml", "-o", "reference.exr", "--method", "path", "--spp", "256", "--seed", "77"})
+          .status,
+      0);
   const Json error = shop.report({"compare", "out.exr", "reference.exr"});
   EXPECT_LE(error.at("relative_rmse"), 1.2);
   EXPECT_LE(report.at("expected_error"), 1.2);
