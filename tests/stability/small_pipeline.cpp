@@ -38,8 +38,8 @@ std::string SmallFabric::toml() const {
          "[warp]\n" + yarn + "[weft]\n" + yarn +
          fmt::format(
              "[visibility]\npca_segments = 512\n[transfer]\norder = {}\ncell_mean_free_paths = {}\nmin_paths = {}\n"
-             "max_paths = {}\n[volume]\n",
-             order, cell_mean_free_paths, paths, paths);
+             "max_paths = {}\ncones = \"{}\"\n[volume]\n",
+             order, cell_mean_free_paths, paths, paths, cones);
 }
 
 std::string SmallScene::toml() const {
