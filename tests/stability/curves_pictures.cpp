@@ -274,7 +274,7 @@ Curve truncation_curve(Effort effort) {
       double square = 0;
       double mean = 0;
       int count = 0;
-      for (const double view : full ? std::vector<double>{-60, -20, 20, 60} : std::vector<double>{-40, 20}) {
+      for (const double view : full ? std::vector<double>{-60, -20, 20, 60} : std::vector<double>{20}) {
         for (const double azimuth : {0.0, 60.0, 90.0}) {
           SmallScene scene;
           scene.wide_mm = 1;

@@ -90,7 +90,7 @@ PictureResult SmallPipeline::picture(const SmallScene& scene, RenderMethod metho
 
 FabricPack SmallPipeline::pack(const FabricVariant& variant) {
   FabricStages stages(folder_ / "fabric.toml", context_, variant);
-  return load_pack(stages.pack({.ssdf = true, .sgs = true, .transfer = true, .volume = false, .order = {}}).path);
+  return load_pack(stages.pack({.ssdf = false, .sgs = false, .transfer = true, .volume = false, .order = {}}).path);
 }
 
 double relative_error(const Image& picture, const Image& reference, const std::vector<bool>& chosen) {
