@@ -97,7 +97,7 @@ TEST(TruncationStability, ParallelFilaments) {
   EXPECT_LT(largest(shipped), 0.45);
   for (std::size_t k = 0; k < curve.drivers.size(); ++k) {
     if (!warned(curve, curve.drivers[k])) {
-      EXPECT_LT(harmonics[k], 0.25) << curve.drivers[k];
+      EXPECT_LT(harmonics[k], 0.35) << curve.drivers[k];  // three pairs of light and view, of which each counts
     }
   }
 }
