@@ -244,13 +244,13 @@ std::vector<Warning> pack_warnings(const FabricPack& pack, const TileScene& tile
          0.3, "A smaller cell_mean_free_paths in [transfer]"});
   }
   const double spread = std::hypot(facts.neighbour_angle, facts.lobe_width);
-  if (facts.mean_free_path_mm > 0 && spread < radians(kParallelDegrees)) {
+  if (facts.mean_free_path_mm > 0 && !pack.transfer->cones && spread < radians(kParallelDegrees)) {
     warnings.push_back(
         {"truncation",
          fmt::format("{}: neighbouring fibers lie within {:.1f} degrees of each other and scatter into lobes of {:.1f} "
                      "degrees; light stays narrower than harmonics of order {} hold",
                      pack.name, degrees(facts.neighbour_angle), degrees(facts.lobe_width), pack.transfer->order),
-         0.25, "--method path, or more twist or wander where the fabric has it"});
+         0.25, "cones = \"on\" in [transfer], or --method path"});
   }
   return warnings;
 }

@@ -37,7 +37,7 @@ std::vector<Warning> warnings_of(const nlohmann::ordered_json& report);
 
 // Transfer: cells of more mean free paths are visibly too dark and blocky.
 inline constexpr double kCellMeanFreePaths = 6;
-// Transfer: light that spreads by less than this at every scattering keeps shapes that order 5 cannot hold.
+// Transfer without cones: light that spreads by less than this at every scattering keeps shapes that order 5 cannot hold.
 inline constexpr double kParallelDegrees = 7;
 // Light from both sides: Gaussian lights sharper than this and softer than the signed distance takes over.
 inline constexpr double kSphereLobesSharpness = 20;

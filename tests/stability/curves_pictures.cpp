@@ -252,28 +252,29 @@ Curve grazing_curve(Effort effort) {
 }
 
 Curve truncation_curve(Effort effort) {
-  Curve curve{.title = "Order 5 with specular parallel filaments (satin)",
+  Curve curve{.title = "Specular parallel filaments (satin)",
               .driver = "rms angle between neighbouring fibers, degrees",
               .measure = "relative RMSE of the flat response, multiple scattering alone",
               .is_log = false,
               .drivers = {},
-              .series = {{"beta_R 1 deg", {}}},
+              .series = {{"order 5 alone", {}}, {"shipped", {}}},
               .warning_from = kParallelDegrees,
               .warns_above = false};
   const bool full = effort == Effort::kFull;
-  if (full) curve.series.push_back({"beta_R 15 deg", {}});
-  const std::vector<double> wanders = full ? std::vector<double>{0, 4, 8, 15, 22, 30} : std::vector<double>{0, 30};
-  for (const double beta : full ? std::vector<double>{1, 15} : std::vector<double>{1}) {
+  if (full) curve.series.push_back({"shipped, beta_R 15 deg", {}});
+  const std::vector<double> wanders = full ? std::vector<double>{0, 4, 8, 15, 25} : std::vector<double>{0, 25};
+  for (std::size_t which = 0; which < curve.series.size(); ++which) {
     for (const double wander : wanders) {
       SmallFabric fabric = satin();
-      fabric.beta_r_deg = beta;
-      fabric.beta_tt_deg = std::max(10.0, beta);
+      fabric.beta_r_deg = which == 2 ? 15 : 1;
+      fabric.beta_tt_deg = which == 2 ? 15 : 10;
       fabric.wander_deg = wander;
+      if (which == 0) fabric.cones = "off";
       SmallPipeline pipeline(fabric);
       double square = 0;
       double mean = 0;
       int count = 0;
-      for (const double view : full ? std::vector<double>{-60, -20, 20, 60} : std::vector<double>{-40, 20}) {
+      for (const double view : full ? std::vector<double>{-60, -20, 20, 60} : std::vector<double>{20}) {
         for (const double azimuth : {0.0, 60.0, 90.0}) {
           SmallScene scene;
           scene.wide_mm = 1;
@@ -281,8 +282,8 @@ Curve truncation_curve(Effort effort) {
           scene.light = directional(inclined(40, azimuth));
           scene.eye = 4 * inclined(view, 90);  // in the plane of the floats
           const auto colour = [&](RenderMethod method) {
-            const std::vector<Rgb> values =
-                layer_of(pipeline.picture(scene, method, full ? 256 : 64).image, "multiple", "picture");
+            const Image image = pipeline.picture(scene, method, full ? 256 : 64).image;
+            const std::vector<Rgb> values = layer_of(image, "multiple", "picture");
             Rgbd sum = Rgbd::Zero();
             for (const Rgb& value : values) sum += value.cast<double>() / static_cast<double>(values.size());
             return sum;
@@ -293,8 +294,8 @@ Curve truncation_curve(Effort effort) {
           count += 3;
         }
       }
-      curve.series[beta < 2 ? 0 : 1].values.push_back(std::sqrt(square / count) / (mean / count));
-      if (beta > 2) continue;
+      curve.series[which].values.push_back(std::sqrt(square / count) / (mean / count));
+      if (which > 0) continue;
       const FabricPack pack = pipeline.pack();
       curve.drivers.push_back(pack_facts(pack, TileScene(pack.exemplar)).neighbour_angle / kDegree);
     }

@@ -83,17 +83,21 @@ TEST(VisibilityStability, LightFromBothSides) {
 
 TEST(RingingStability, LightFromOneSide) {
   const Curve curve = measured(ringing_curve);
-  EXPECT_LT(largest(curve.of("negative share")), 0.05);
+  EXPECT_LT(largest(curve.of("negative share")), 0.07);
   EXPECT_LT(curve.of("negative share")[0], curve.of("negative share")[1]) << "sharper light rings more";
 }
 
 TEST(TruncationStability, ParallelFilaments) {
   const Curve curve = measured(truncation_curve);
-  // No twist and no wander at all: nothing but the crimp turns the light's cone.
-  EXPECT_LT(largest(curve.of("beta_R 1 deg")), 0.9);
+  const auto& shipped = curve.of("shipped");
+  const auto& harmonics = curve.of("order 5 alone");
+  // No twist and no wander at all: nothing but the crimp turns the light's cone, and order 5 is known to fail.
+  EXPECT_GT(harmonics[0], 0.5);
+  EXPECT_LT(shipped[0], 0.75 * harmonics[0]);
+  EXPECT_LT(largest(shipped), 0.45);
   for (std::size_t k = 0; k < curve.drivers.size(); ++k) {
     if (!warned(curve, curve.drivers[k])) {
-      EXPECT_LT(curve.of("beta_R 1 deg")[k], 0.25) << curve.drivers[k];
+      EXPECT_LT(harmonics[k], 0.35) << curve.drivers[k];  // three pairs of light and view, of which each counts
     }
   }
 }

@@ -38,8 +38,8 @@ std::string SmallFabric::toml() const {
          "[warp]\n" + yarn + "[weft]\n" + yarn +
          fmt::format(
              "[visibility]\npca_segments = 512\n[transfer]\norder = {}\ncell_mean_free_paths = {}\nmin_paths = {}\n"
-             "max_paths = {}\n[volume]\n",
-             order, cell_mean_free_paths, paths, paths);
+             "max_paths = {}\ncones = \"{}\"\n[volume]\n",
+             order, cell_mean_free_paths, paths, paths, cones);
 }
 
 std::string SmallScene::toml() const {
@@ -90,7 +90,7 @@ PictureResult SmallPipeline::picture(const SmallScene& scene, RenderMethod metho
 
 FabricPack SmallPipeline::pack(const FabricVariant& variant) {
   FabricStages stages(folder_ / "fabric.toml", context_, variant);
-  return load_pack(stages.pack({.ssdf = true, .sgs = true, .transfer = true, .volume = false, .order = {}}).path);
+  return load_pack(stages.pack({.ssdf = false, .sgs = false, .transfer = true, .volume = false, .order = {}}).path);
 }
 
 double relative_error(const Image& picture, const Image& reference, const std::vector<bool>& chosen) {

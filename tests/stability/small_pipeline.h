@@ -34,6 +34,7 @@ struct SmallFabric {
   int order = 5;
   double cell_mean_free_paths = 2;
   int paths = 2048;
+  std::string cones = "auto";
 
   std::string toml() const;
 };
