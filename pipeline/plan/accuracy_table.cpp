@@ -115,6 +115,7 @@ Json accuracy_json(const AccuracyTable& table) {
                                 {"entries", entries_json(setting.entries)},
                                 {"bent", entries_json(setting.bent)}});
   }
+  json["costs"] = Json::object();
   for (const auto& [part, cost] : table.costs) {
     json["costs"][part] = {{"seconds", cost.seconds}, {"core_seconds", cost.core_seconds}};
   }

@@ -83,6 +83,8 @@ def main():
             for cost in pathlib.Path(fresh).glob("*/*.cost.json"):
                 if cost.parent.name != "accuracy":
                     build += json.loads(cost.read_text())[seconds]
+        if done.returncode != 0 and "no way meets" not in done.stderr:
+            sys.exit(f"heddle render {scene}: {done.stderr}")
         if done.returncode != 0:
             print(f'| {entry["scene"]} | {tolerance:.0%} | {pictures} | | none | | | | | |', flush=True)
             continue

@@ -220,6 +220,10 @@ TEST(AccuracyTableFormat, RoundTrip) {
   write_accuracy(path, small_table());
   EXPECT_EQ(accuracy_json(read_accuracy(path)), accuracy_json(small_table()));
   EXPECT_NE(accuracy_text(small_table()).find("exact"), std::string::npos);
+  AccuracyTable of_surface = small_table();
+  of_surface.costs.clear();
+  write_accuracy(path, of_surface);
+  EXPECT_EQ(accuracy_json(read_accuracy(path)), accuracy_json(of_surface)) << "nothing to build";
 }
 
 TEST(AccuracyTableFormat, DamagedTablesAreRefused) {
