@@ -281,6 +281,7 @@ PictureResult SceneJob::render(const PictureRequest& request, const std::string&
   const Camera camera(request.camera);
 
   PictureSetup setup{loaded.scene.get(), {}, config_.lights, &camera, request.crop, request.method, variant_.blend};
+  setup.interactive_surfaces = !traces_paths(request.method) && !surface_stages().keys().empty();
   std::vector<const FabricPack*> packs;
   for (const ClothConfig& cloth : config_.cloths) {
     if (!cloth.surface) packs.push_back(&loaded.packs.at(cloth.fabric));

@@ -159,6 +159,12 @@ void add_light_warnings(const PictureSetup& setup, std::vector<Warning>& warning
   }
   for (std::size_t l = 0; l < setup.lights.size(); ++l) {
     const Light& light = setup.lights[l];
+    if (light.type == LightType::kSphericalGaussian && setup.interactive_surfaces && light.sharpness < kInteractiveSharpness) {
+      warnings.push_back({"wide-light",
+                          fmt::format("{} has sharpness {:g}, and interactive surfaces take light below {:g} as if their weights were constant across it",
+                                      light_name(l, setup.lights.size()), light.sharpness, kInteractiveSharpness),
+                          light.sharpness < 3 ? 0.4 : 0.13, "surface_method = \"sampled\", or several sharper lights in its place"});
+    }
     if (light.type != LightType::kSphericalGaussian || !takes_visibility_forms(setup.method)) continue;
     const double sharpness = light.sharpness;
     const std::string name = fmt::format("{} has sharpness {:g}", light_name(l, setup.lights.size()), sharpness);

@@ -61,6 +61,8 @@ inline constexpr double kPlaneDegrees = 8;
 inline constexpr double kHiddenTetShare = 0.005;
 // Negative light by ringing, share of multiple scattering.
 inline constexpr double kNegativeShare = 0.01;
+// Interactive surfaces: Gaussian lights softer than this, from which the weights do not come out of the integral.
+inline constexpr double kInteractiveSharpness = 20;
 // Noise of pixels that cover more than a repeat.
 inline constexpr double kNoise = 0.1;
 
@@ -86,6 +88,7 @@ struct PictureSetup {
   PixelRect crop;
   RenderMethod method = RenderMethod::kExact;
   VisibilityBlend blend;
+  bool interactive_surfaces = false;  // some cloth is a surface by its interactive method
 };
 
 /// Of the picture, before it is made, without those of its packs: from some hundred eye rays.

@@ -1,8 +1,10 @@
 // What one value of a surface model costs, for every preset: one thread, so that rates are per core.
 //
-//   heddle_surface_models [--benchmark_filter=REGEX]     model.quantity.fabric: reflected, sample, pdf, sg (sharpness 100)
+//   heddle_surface_models [--benchmark_filter=REGEX]     model.quantity.fabric: reflected (a point), footprint_0.1mm,
+//                                                        footprint_0.5mm, far (20 mm), sample, pdf, sg (sharpness 100), all at a point
 //   heddle_surface_models --pairs N                      instead: reflected() for N random, grazing and opposite pairs of
-//                                                        directions and each preset, on all threads; 1 where one is
+//                                                        directions and each preset, at random places, seen as points, at footprints
+//                                                        from 0.01 to 1 mm, and from afar, on all threads; 1 where one is
 //                                                        negative or not finite
 
 #include <benchmark/benchmark.h>
@@ -12,6 +14,7 @@
 
 #include <CLI/CLI.hpp>
 #include <chrono>
+#include <cmath>
 #include <memory>
 #include <string>
 #include <vector>
@@ -23,6 +26,7 @@
 namespace heddle {
 namespace {
 
+constexpr float kFar = 20;  // mm: a footprint of many repeats
 constexpr std::size_t kDirections = 1024;  // pairs that a benchmark goes through: a power of 2
 
 std::vector<std::pair<Vec3d, Vec3d>> directions() {
@@ -51,6 +55,15 @@ void add_benchmarks(const std::string& name) {
   add("reflected", [](const SurfaceModel& m, const Vec3d& wi, const Vec3d& wo, std::size_t) {
     return m.reflected({}, wi, wo).sum();
   });
+  const auto add_footprint = [&](const char* quantity, float footprint) {
+    add(quantity, [footprint](const SurfaceModel& m, const Vec3d& wi, const Vec3d& wo, std::size_t k) {
+      const auto place = static_cast<float>(k % kDirections) / kDirections;
+      return m.reflected({Vec2(3 * place, 7 * place), footprint}, wi, wo).sum();
+    });
+  };
+  add_footprint("footprint_0.1mm", 0.1F);
+  add_footprint("footprint_0.5mm", 0.5F);
+  add_footprint("far", kFar);
   add("sample", [](const SurfaceModel& m, const Vec3d&, const Vec3d& wo, std::size_t k) {
     RandomStream random(1, RandomStage::kBench, 1, k);
     const auto sample = m.sample({}, wo.cast<float>(), random);
@@ -62,6 +75,15 @@ void add_benchmarks(const std::string& name) {
   add("sg", [](const SurfaceModel& m, const Vec3d& wi, const Vec3d& wo, std::size_t) {
     return m.reflected_sg({}, wi, 100, wo).sum();
   });
+}
+
+/// A place on the cloth, and in turns a point, a footprint from 0.01 to 1 mm, and one of many repeats.
+SurfacePoint random_point(RandomStream& random, int k) {
+  SurfacePoint point;
+  point.position_mm = 20 * Vec2(random.uniform(), random.uniform());
+  if (k / 3 % 3 == 1) point.footprint_mm = std::pow(10.0F, -2 * random.uniform());
+  if (k / 3 % 3 == 2) point.footprint_mm = kFar;
+  return point;
 }
 
 /// True where all values are finite and none is negative.
@@ -79,7 +101,7 @@ bool check_pairs(const std::string& name, int pairs) {
     RandomStream random(1, RandomStage::kBench, 2, static_cast<std::uint64_t>(block));
     for (int k = block * kBlock; k < std::min(pairs, (block + 1) * kBlock); ++k) {
       const auto [wi, wo] = random_pair_above(random, k);
-      const Rgbd value = model->reflected({}, wi, wo);
+      const Rgbd value = model->reflected(random_point(random, k), wi, wo);
       const bool good = value.isFinite().all() && (value >= 0).all();
       if (good) result.most = std::max(result.most, value.maxCoeff());
       result.bad += !good;

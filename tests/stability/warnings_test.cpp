@@ -255,6 +255,22 @@ TEST(PictureWarningsStability, NegativeLight) {
   }
 }
 
+TEST(PictureWarningsStability, WideLightsOnInteractiveSurfaces) {
+  const ClothScene cloth(std::vector<ClothPiece>{}, {});
+  const Camera camera(CameraConfig{});
+  for (const float sharpness : {0.0F, 3.0F, 19.0F, 21.0F, 150.0F}) {
+    Light light;
+    light.type = LightType::kSphericalGaussian;
+    light.axis = Vec3(0, 0, 1);
+    light.sharpness = sharpness;
+    const std::vector<Light> lights = {light};
+    PictureSetup setup{&cloth, {}, lights, &camera, {0, 0, 1, 1}, RenderMethod::kExact, {}};
+    EXPECT_EQ(subjects_of(picture_warnings(setup)), Subjects{}) << sharpness;
+    setup.interactive_surfaces = true;
+    EXPECT_EQ(subjects_of(picture_warnings(setup)), sharpness < kInteractiveSharpness ? Subjects{"wide-light"} : Subjects{}) << sharpness;
+  }
+}
+
 TEST(PictureWarningsStability, NoneOnTheQuickstart) {
   namespace fs = std::filesystem;
   const fs::path file = fs::path(HEDDLE_SOURCE_DIR) / "configs" / "scenes" / "quickstart.toml";
