@@ -4,7 +4,8 @@
 //                                                        footprint_0.5mm, far (20 mm), sample, pdf, sg (sharpness 100), all at a point
 //   heddle_surface_models --pairs N                      instead: reflected() for N random, grazing and opposite pairs of
 //                                                        directions and each preset, at random places, seen as points, at footprints
-//                                                        from 0.01 to 1 mm, and from afar, on all threads; 1 where one is
+//                                                        from 0.01 to 1 mm, and from afar, and of the interactive form under Gaussian
+//                                                        lights, on all threads; 1 where one is
 //                                                        negative or not finite
 
 #include <benchmark/benchmark.h>
@@ -15,10 +16,14 @@
 #include <CLI/CLI.hpp>
 #include <chrono>
 #include <cmath>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "render/lights.h"
+#include "render/surface/interactive_microcylinder.h"
+#include "render/surface/microcylinder.h"
 #include "render/surface/surface_model.h"
 #include "render/surface/surface_presets.h"
 #include "tests/support/direction_pairs.h"
@@ -116,6 +121,32 @@ bool check_pairs(const std::string& name, int pairs) {
   return all.bad == 0;
 }
 
+/// The same of the interactive form of a microcylinder fabric: an open surface, one Gaussian light of sharpness 0 or 0.01 to 10^6.
+bool check_interactive(const std::string& name, int pairs) {
+  const InteractiveMicrocylinder model(read_microcylinder_fabric(surface_preset(name)), {});
+  const auto start = std::chrono::steady_clock::now();
+  tbb::combinable<int> bad([] { return 0; });
+  constexpr int kBlock = 1000;
+  tbb::parallel_for(0, (pairs + kBlock - 1) / kBlock, [&](int block) {
+    RandomStream random(1, RandomStage::kBench, 3, static_cast<std::uint64_t>(block));
+    for (int k = block * kBlock; k < std::min(pairs, (block + 1) * kBlock); ++k) {
+      const auto [wi, wo] = random_pair_above(random, k);
+      Light light;
+      light.type = LightType::kSphericalGaussian;
+      light.axis = k % 10 == 0 ? sample_sphere(random) : wi.cast<float>();
+      light.sharpness = k % 7 == 0 ? 0 : std::pow(10.0F, 8 * random.uniform() - 2);
+      light.irradiance = Rgb::Ones();
+      const Rgbd value = model.shade(Mat3d::Identity(), wo, {&light, 1}, {});
+      bad.local() += !(value.isFinite().all() && (value >= 0).all());
+    }
+  });
+  const int all = bad.combine(std::plus<>());
+  const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
+  fmt::print("{:<28} {} pairs by the interactive form, {} negative or not finite, {:.1f} s, {:.0f} a second\n", name, pairs, all,
+             seconds.count(), pairs / seconds.count());
+  return all == 0;
+}
+
 int run(int argc, char** argv) {
   benchmark::Initialize(&argc, argv);
   CLI::App app("Cost and robustness of the surface models");
@@ -125,6 +156,7 @@ int run(int argc, char** argv) {
   if (pairs > 0) {
     bool good = true;
     for (const std::string& name : surface_preset_names()) good = check_pairs(name, pairs) && good;
+    for (const std::string& name : surface_preset_names("microcylinder")) good = check_interactive(name, pairs) && good;
     return good ? 0 : 1;
   }
   for (const std::string& name : surface_preset_names()) add_benchmarks(name);
