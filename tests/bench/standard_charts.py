@@ -387,7 +387,7 @@ def main():
             json.dump(document, file, indent=1)
             file.write("\n")
     page = ["# Standard charts", "", "Made by `python3 tests/bench/standard_charts.py`, which says what each is. Each JSON holds the figures with the command, key, "
-            "seed, seconds and program version behind them.", ""]
+            "seed, seconds and program version behind them. 0 % means: not told from none (the reference's noise outweighs the error); bars are 95 % intervals.", ""]
     for name, (title, _) in CHARTS.items():
         path = f"{options.output}/{name}.json"
         if not os.path.exists(path):
