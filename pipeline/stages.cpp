@@ -41,10 +41,7 @@ void write_transfer_chunk(const fs::path& path, const TransferChunk& chunk, int 
   writer.add<float>("matrices", {cells, bands * bands, bands * bands, 3}, chunk.matrices);
   writer.add<float>("standard_error", {cells, bands, 3}, chunk.standard_error);
   writer.add<std::uint32_t>("paths", {cells}, chunk.paths);
-  if (chunk.cones) {
-    writer.add<float>("cone_harmonics", {cells, bands * bands, bands * bands, 3}, chunk.cones->harmonics);
-    writer.add<float>("cone_moments", {cells, ConeTransfer::kWidths, bands * bands, ConeTransfer::kAzimuths, 3}, chunk.cones->moments);
-  }
+  if (chunk.cones) add_cones(writer, *chunk.cones, cells, bands * bands);
   writer.write(path);
 }
 
@@ -56,11 +53,7 @@ TransferChunk read_transfer_chunk(const fs::path& path, std::uint32_t first_cell
   chunk.matrices = file.get<float>("matrices", {cells, bands * bands, bands * bands, 3});
   chunk.standard_error = file.get<float>("standard_error", {cells, bands, 3});
   chunk.paths = file.get<std::uint32_t>("paths", {cells});
-  if (file.entries().contains("cone_moments")) {
-    chunk.cones = ConeTransfer{
-        file.get<float>("cone_harmonics", {cells, bands * bands, bands * bands, 3}),
-        file.get<float>("cone_moments", {cells, ConeTransfer::kWidths, bands * bands, ConeTransfer::kAzimuths, 3})};
-  }
+  chunk.cones = get_cones(file, cells, bands * bands);
   return chunk;
 }
 

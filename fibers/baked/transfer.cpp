@@ -43,6 +43,17 @@ void Transfer::incoming_on_cones(std::uint32_t cell, const float* light, float* 
   }
 }
 
+void add_cones(TensorFileWriter& file, const ConeTransfer& cones, std::uint64_t cells, std::uint64_t n) {
+  file.add<float>("cone_harmonics", {cells, n, n, 3}, cones.harmonics);
+  file.add<float>("cone_moments", {cells, ConeTransfer::kWidths, n, ConeTransfer::kAzimuths, 3}, cones.moments);
+}
+
+std::optional<ConeTransfer> get_cones(const TensorFile& file, std::uint64_t cells, std::uint64_t n) {
+  if (!file.entries().contains("cone_moments")) return {};
+  return ConeTransfer{file.get<float>("cone_harmonics", {cells, n, n, 3}),
+                      file.get<float>("cone_moments", {cells, ConeTransfer::kWidths, n, ConeTransfer::kAzimuths, 3})};
+}
+
 void write_transfer(const std::filesystem::path& path, const Transfer& t,
                     const std::map<std::string, std::string>& metadata) {
   const auto n = static_cast<std::uint64_t>(t.coefficients());
@@ -55,10 +66,7 @@ void write_transfer(const std::filesystem::path& path, const Transfer& t,
   file.add<float>("matrices", {t.cell_count(), n, n, 3}, t.matrices);
   file.add<float>("standard_error", {t.cell_count(), bands, 3}, t.standard_error);
   file.add<std::uint32_t>("paths", {t.cell_count()}, t.paths);
-  if (t.cones) {
-    file.add<float>("cone_harmonics", {t.cell_count(), n, n, 3}, t.cones->harmonics);
-    file.add<float>("cone_moments", {t.cell_count(), ConeTransfer::kWidths, n, ConeTransfer::kAzimuths, 3}, t.cones->moments);
-  }
+  if (t.cones) add_cones(file, *t.cones, t.cell_count(), n);
   file.write(path);
 }
 
@@ -78,11 +86,7 @@ Transfer read_transfer(const std::filesystem::path& path) {
   t.matrices = file.get<float>("matrices", {count, n, n, 3});
   t.standard_error = file.get<float>("standard_error", {count, error_shape[1], 3});
   t.paths = file.get<std::uint32_t>("paths", {count});
-  if (file.entries().contains("cone_moments")) {
-    t.cones = ConeTransfer{
-        file.get<float>("cone_harmonics", {count, n, n, 3}),
-        file.get<float>("cone_moments", {count, ConeTransfer::kWidths, n, ConeTransfer::kAzimuths, 3})};
-  }
+  t.cones = get_cones(file, count, n);
   t.cell_of_segment = file.get<std::uint32_t>("cell_of_segment", {file.shape("cell_of_segment").at(0)});
   for (const std::uint32_t cell : t.cell_of_segment) {
     if (cell >= count) throw FileError(fmt::format("{}: cell {} of {}", path.string(), cell, count));

@@ -17,6 +17,9 @@
 
 namespace heddle {
 
+class TensorFile;
+class TensorFileWriter;
+
 struct Transfer {
   int order = 5;  // highest SH band; (order + 1)^2 coefficients
   bool both_sides = false;            // light from the whole sphere; otherwise only from the face side (z > 0)
@@ -40,6 +43,11 @@ struct Transfer {
 void write_transfer(const std::filesystem::path& path, const Transfer& transfer,
                     const std::map<std::string, std::string>& metadata);
 Transfer read_transfer(const std::filesystem::path& path);
+
+/// The cones' tensors of `cells` cells at `coefficients` harmonics, in a transfer's file or in a chunk of one.
+void add_cones(TensorFileWriter& file, const ConeTransfer& cones, std::uint64_t cells, std::uint64_t coefficients);
+/// Nothing where the file holds none.
+std::optional<ConeTransfer> get_cones(const TensorFile& file, std::uint64_t cells, std::uint64_t coefficients);
 
 }  // namespace heddle
 

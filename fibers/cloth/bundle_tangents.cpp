@@ -43,20 +43,16 @@ std::vector<Vec3> bundle_tangents(const Exemplar& exemplar) {
     members[static_cast<std::size_t>(y * nx + x)].push_back(s);
   }
   // With fewer than three columns around a period, a step to either side would meet the same column twice.
-  const int reach_x = std::min(1, (nx - 1) / 2);
-  const int reach_y = std::min(1, (ny - 1) / 2);
-  const int first_x = nx == 2 ? 0 : -reach_x;
-  const int last_x = nx == 2 ? 1 : reach_x;
-  const int first_y = ny == 2 ? 0 : -reach_y;
-  const int last_y = ny == 2 ? 1 : reach_y;
+  const auto first_step = [](int count) { return count > 2 ? -1 : 0; };
+  const auto last_step = [](int count) { return count > 1 ? 1 : 0; };
 
   std::vector<Vec3> mean(segments);
   tbb::parallel_for(std::uint32_t{0}, segments, [&](std::uint32_t s) {
     const float radius = kBundleRadii * exemplar.radius_mm[exemplar.segment_fiber[s]];
     const auto [x, y] = place_of(s);
     Vec3 sum = tangent[s];
-    for (int dy = first_y; dy <= last_y; ++dy) {
-      for (int dx = first_x; dx <= last_x; ++dx) {
+    for (int dy = first_step(ny); dy <= last_step(ny); ++dy) {
+      for (int dx = first_step(nx); dx <= last_step(nx); ++dx) {
         for (const std::uint32_t other :
              members[static_cast<std::size_t>((y + dy + ny) % ny * nx + (x + dx + nx) % nx)]) {
           if (other == s) continue;
