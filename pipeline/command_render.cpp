@@ -3,11 +3,13 @@
 #include <cmath>
 #include <map>
 #include <optional>
+#include <span>
 
 #include "formats/input_error.h"
 #include "pipeline/commands.h"
 #include "pipeline/job.h"
 #include "pipeline/picture_request.h"
+#include "pipeline/plan/probe.h"
 #include "pipeline/plan/scene_plan.h"
 #include "pipeline/scene_job.h"
 #include "render/render_output.h"
@@ -43,17 +45,12 @@ void write_picture(const PictureResult& picture, const std::filesystem::path& ou
   job.add_artifact(output);
 }
 
-/// Noise that the picture itself shows: root of the mean over pixels and channels of the variance, over the mean.
-std::optional<double> relative_noise_of(const Image& image) {
-  if (!image.channels.contains("Variance.R")) return {};
-  const auto mean_of = [&image](const std::string& layer) {
-    double sum = 0;
-    for (const Rgb& color : layer_of(image, layer, "picture")) sum += static_cast<double>(color.mean());
-    return sum / (static_cast<double>(image.width) * image.height);
-  };
-  const double mean = mean_of("");
-  if (!(mean > 0)) return {};
-  return std::sqrt(mean_of("Variance")) / mean;
+/// Variance of one sample of a pixel as the picture itself shows it, relative to the squared mean radiance.
+Estimate relative_noise_of(const FrameBuffers& frame) {
+  const double mean = mean_radiance(std::span(&frame, 1));
+  const Estimate variance = sample_variance_of_all(frame);
+  const double scale = mean > 0 ? 1 / (mean * mean) : 0;
+  return {scale * variance.value, scale * variance.error};
 }
 
 /// The cheapest picture that is good enough.
@@ -79,14 +76,21 @@ int render_within(double tolerance, const RenderOptions& options, Job& job) {
   job.console().say(plan_text(plan));
   const Way& way = plan.ways[*plan.chosen];
   SceneJob scene(options.scene, job.context(), way.variant);
-  PictureResult picture = scene.render(plan.request, "render");
-  const double bias_square = std::max(0.0, way.candidate.bias_square.value);
-  const double noise = relative_noise_of(picture.image)
-                           .value_or(std::sqrt(std::max(0.0, way.candidate.noise_square.value) / plan.offer->spp));
-  const double error = std::sqrt(bias_square + noise * noise);
+  PictureRequest request = plan.request;
+  request.spp = first_samples(way.candidate, tolerance);
+  Estimate noise_square;  // of a sample
+  int spp = 0;
+  request.more = [&](const FrameBuffers& frame) {
+    noise_square = relative_noise_of(frame);
+    spp = frame.spp;
+    return more_samples(way.candidate, noise_square, frame.spp, tolerance);
+  };
+  PictureResult picture = scene.render(request, "render");
+  const double noise = std::sqrt(noise_square.value / spp);
+  const double error = std::hypot(std::sqrt(std::max(0.0, way.candidate.bias_square.value)), noise);
   const std::string done = fmt::format(
       "{}, {} spp in {:.3g} s: expected error {:.3g} %, of that noise {:.3g} %, as the picture shows",
-      way.candidate.name, plan.offer->spp, picture.report.at("seconds").get<double>(), 100 * error, 100 * noise);
+      way.candidate.name, spp, picture.report.at("seconds").get<double>(), 100 * error, 100 * noise);
   if (error > tolerance) {
     job.console().warn(done + fmt::format("; more than the {:.3g} % asked for", 100 * tolerance));
   } else {

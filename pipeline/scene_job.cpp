@@ -227,8 +227,10 @@ struct SceneJob::Shading {
 
   FrameBuffers frame(const PictureRequest& request, const Camera& camera, const PixelRect& crop,
                      const RenderProgress& progress) const {
-    if (tracer) return trace_picture(*tracer, camera, crop, request.seed, {request.spp, request.seconds}, progress);
-    return shade_picture(*renderer, camera, crop, request.spp, progress);
+    if (tracer) {
+      return trace_picture(*tracer, camera, crop, request.seed, {request.spp, request.seconds, request.more}, progress);
+    }
+    return shade_picture(*renderer, camera, crop, request.spp, progress, request.more);
   }
 };
 
@@ -276,7 +278,7 @@ const ClothScene& SceneJob::fibers_scene() {
 }
 
 PictureResult SceneJob::render(const PictureRequest& request, const std::string& title, bool quiet) {
-  const std::string key = picture_key(request);
+  std::string key = picture_key(request);
   const Loaded& loaded = loaded_for(request.method);
   const Camera camera(request.camera);
 
@@ -307,12 +309,18 @@ PictureResult SceneJob::render(const PictureRequest& request, const std::string&
   const RenderProgress report_progress = [&](double share) {
     stop_if_interrupted();
     const auto now = static_cast<std::uint64_t>(std::min(share, 1.0) * static_cast<double>(total));
-    progress.advance(now - shown);
-    shown = now;
+    // Samples beyond the first start again at 0.
+    if (now > shown) progress.advance(now - shown);
+    shown = std::max(shown, now);
   };
 
   const std::unique_ptr<Shading> shading = shading_for(request);
   const FrameBuffers frame = shading->frame(request, camera, request.crop, report_progress);
+  if (request.more) {
+    PictureRequest made = request;
+    made.spp = frame.spp;
+    key = picture_key(made);
+  }
   const double environment_error = shading->renderer ? shading->renderer->environment_error() : 0;
 
   const WorkTime time = watch.elapsed();

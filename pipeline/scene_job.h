@@ -58,6 +58,7 @@ struct PictureRequest {
   bool local = false;
   std::optional<int> bounces;
   LightEstimator estimator = LightEstimator::kCombined;
+  MoreSamples more = {};  // beyond spp; needs 2 or more of those
 };
 
 /// A picture and what is worth knowing of its making.

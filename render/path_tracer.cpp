@@ -114,24 +114,25 @@ FrameBuffers trace_picture(const PathTracer& tracer, const Camera& camera, const
     });
   };
 
-  const auto start = std::chrono::steady_clock::now();
-  int done = 0;
-  for (double share = 0; share < 1;) {
-    progress(share);
-    const int count = budget.seconds ? 2 : std::min(8, budget.spp - done);
-    pass(done, done + count);
-    done += count;
-    const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
-    share = budget.seconds ? spent.count() / *budget.seconds : static_cast<double>(done) / budget.spp;
-  }
-  progress(1.0);
-
   FrameBuffers frame(crop.width, crop.height);
-  frame.spp = done;
   frame.half0.resize(sums.size());
   frame.half1.resize(sums.size());
   frame.variance.resize(sums.size());
-  for (std::size_t k = 0; k < sums.size(); ++k) sums[k].store(done, k, frame);
+  const auto start = std::chrono::steady_clock::now();
+  for (int wanted = budget.spp, more = 1; more > 0; wanted += more) {
+    for (double share = 0; share < 1;) {
+      progress(share);
+      const int count = budget.seconds ? 2 : std::min(8, wanted - frame.spp);
+      pass(frame.spp, frame.spp + count);
+      frame.spp += count;
+      const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
+      share = budget.seconds ? spent.count() / *budget.seconds : static_cast<double>(frame.spp) / wanted;
+    }
+    progress(1.0);
+    for (std::size_t k = 0; k < sums.size(); ++k) sums[k].store(frame.spp, k, frame);
+    more = budget.more ? budget.more(frame) : 0;
+    assert(more % 2 == 0);
+  }
   return frame;
 }
 

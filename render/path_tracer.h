@@ -59,13 +59,14 @@ class PathTracer {
 std::vector<BcsdfTable> scene_materials(const ClothScene& scene);
 
 /// Either a number of samples per pixel (even, at least 2) or a time; a timed picture is made of whole passes
-/// of two samples per pixel, at least one.
+/// of two samples per pixel, at least one. `more` may lengthen it.
 struct SampleBudget {
   int spp = 2;
   std::optional<double> seconds;
+  MoreSamples more = {};
 };
 
-/// Called between passes with the share done, 0 .. 1; may throw to stop.
+/// Called between passes with the share done of the samples asked for so far, 0 .. 1; may throw to stop.
 using RenderProgress = std::function<void(double)>;
 
 /// Beauty, single, multiple, alpha, half0 (even samples), half1 (odd samples), variance of the pixel's mean;

@@ -294,9 +294,8 @@ void PrecomputedRenderer::shade(const Camera& camera, const PixelRect& block, in
 }
 
 FrameBuffers shade_picture(const PrecomputedRenderer& renderer, const Camera& camera, const PixelRect& crop,
-                           int spp, const RenderProgress& progress) {
+                           int spp, const RenderProgress& progress, const MoreSamples& more) {
   FrameBuffers frame(crop.width, crop.height);
-  frame.spp = spp;
   const std::size_t count = frame.pixel_count();
   frame.segment.assign(count, PrecomputedRenderer::Seen::kNone);
   frame.cell.assign(count, PrecomputedRenderer::Seen::kNone);
@@ -311,17 +310,20 @@ FrameBuffers shade_picture(const PrecomputedRenderer& renderer, const Camera& ca
 
   const int columns = (crop.width + kBlockEdge - 1) / kBlockEdge;
   const int rows = (crop.height + kBlockEdge - 1) / kBlockEdge;
-  const auto shade_block = [&](int index) {
+  const int blocks = columns * rows;
+  constexpr std::size_t kBlockPixels = kBlockEdge * kBlockEdge;
+  std::vector<PixelSums> all_sums(static_cast<std::size_t>(blocks) * kBlockPixels);  // [block][pixel]
+  const auto shade_block = [&](int index, int first_sample, int last_sample) {
     const int left = index % columns * kBlockEdge;  // within the crop
     const int top = index / columns * kBlockEdge;
     const PixelRect block = {crop.x0 + left, crop.y0 + top, std::min(kBlockEdge, crop.width - left),
                              std::min(kBlockEdge, crop.height - top)};
     const int pixels = block.width * block.height;
-    std::vector<PixelSums> sums(static_cast<std::size_t>(pixels));
+    PixelSums* const sums = &all_sums[static_cast<std::size_t>(index) * kBlockPixels];
     std::vector<PrecomputedRenderer::Sample> samples;
     std::vector<std::optional<PrecomputedRenderer::Seen>> seen;
-    for (int first = 0; first < spp; first += kBlockSamples) {
-      const int last = std::min(spp, first + kBlockSamples);
+    for (int first = first_sample; first < last_sample; first += kBlockSamples) {
+      const int last = std::min(last_sample, first + kBlockSamples);
       renderer.shade(camera, block, first, last, samples, seen);
       for (int i = 0; i < pixels * (last - first); ++i) {
         sums[i / (last - first)].add(samples[i], first + i % (last - first));
@@ -330,8 +332,8 @@ FrameBuffers shade_picture(const PrecomputedRenderer& renderer, const Camera& ca
     for (int p = 0; p < pixels; ++p) {
       const std::size_t k =
           static_cast<std::size_t>(top + p / block.width) * crop.width + left + p % block.width;
-      sums[p].store(spp, k, frame);
-      if (!seen[p]) continue;
+      sums[p].store(last_sample, k, frame);
+      if (first_sample > 0 || !seen[p]) continue;
       frame.segment[k] = seen[p]->segment;
       frame.cell[k] = seen[p]->cell;
       frame.fabric_position[k] = seen[p]->fabric.cast<float>();
@@ -339,12 +341,15 @@ FrameBuffers shade_picture(const PrecomputedRenderer& renderer, const Camera& ca
       frame.tangent[k] = seen[p]->tangent;
     }
   };
-  const int blocks = columns * rows;
-  for (int start = 0; start < blocks; start += kBlocksPerReport) {
-    progress(static_cast<double>(start) / blocks);
-    tbb::parallel_for(start, std::min(blocks, start + kBlocksPerReport), shade_block);
+  for (int wanted = spp; wanted > frame.spp; wanted += more ? more(frame) : 0) {
+    for (int start = 0; start < blocks; start += kBlocksPerReport) {
+      progress(static_cast<double>(start) / blocks);
+      tbb::parallel_for(start, std::min(blocks, start + kBlocksPerReport),
+                        [&](int index) { shade_block(index, frame.spp, wanted); });
+    }
+    progress(1.0);
+    frame.spp = wanted;
   }
-  progress(1.0);
   return frame;
 }
 

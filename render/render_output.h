@@ -7,6 +7,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <string>
 #include <vector>
@@ -50,6 +51,10 @@ struct FrameBuffers {
     return static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   }
 };
+
+/// Asked with the picture so far, once the samples that were asked for are done: how many more per pixel (even where paths are
+/// traced); 0 ends the picture. It is the same as if all its samples had been asked for at once.
+using MoreSamples = std::function<int(const FrameBuffers&)>;
 
 Image image_of(const FrameBuffers& frame, const std::map<std::string, std::string>& metadata);
 

@@ -320,6 +320,7 @@ Shoot paths(const Swatch& swatch, int flat_samples, int max_scatterings) {
     const int samples = flat_samples * (bent ? swatch.effort().bent_factor : 1);
     PathTracerSettings settings;
     settings.seed = swatch.seed();
+    settings.local = true;
     if (max_scatterings > 0) settings.limits.max_scatterings = max_scatterings;
     Shot shot;
     const Stopwatch setup;

@@ -22,6 +22,12 @@ double room(const Candidate& candidate, double tolerance) {
   return kAim * tolerance * tolerance - cautious(candidate.bias_square);
 }
 
+/// Samples in the candidate's steps; one step more than kMostSamples where those are not enough.
+int in_steps(double samples, int step) {
+  const double steps = std::ceil(std::min(samples, static_cast<double>(kMostSamples)) / step);
+  return step * std::max(1, static_cast<int>(steps));
+}
+
 }  // namespace
 
 std::optional<Offer> offer(const Candidate& candidate, double tolerance, int pictures) {
@@ -29,13 +35,25 @@ std::optional<Offer> offer(const Candidate& candidate, double tolerance, int pic
   const double needed = left > 0 ? cautious(candidate.noise_square) / left : std::numeric_limits<double>::infinity();
   if (!(needed <= kMostSamples)) return {};
   Offer result;
-  const int steps = static_cast<int>(std::ceil(needed / candidate.spp_step));
-  result.spp = candidate.spp_step * std::max(1, steps);
+  result.spp = in_steps(needed, candidate.spp_step);
   result.seconds_per_picture = candidate.setup_seconds + result.spp * candidate.seconds_per_spp;
   result.seconds = candidate.build_seconds + pictures * result.seconds_per_picture;
   result.expected_error =
       std::sqrt(std::max(0.0, candidate.bias_square.value) + std::max(0.0, candidate.noise_square.value) / result.spp);
   return result;
+}
+
+int first_samples(const Candidate& candidate, double tolerance) {
+  const double left = room(candidate, tolerance);
+  return left > 0 ? in_steps(std::max(2.0, candidate.noise_square.value / left), candidate.spp_step) : 2;
+}
+
+int more_samples(const Candidate& candidate, const Estimate& noise_square, int done, double tolerance) {
+  const double left = room(candidate, tolerance);
+  if (!(left > 0)) return 0;
+  const double needed = cautious(noise_square) / left;
+  if (needed <= done || done >= kMostSamples) return 0;
+  return in_steps(std::min(needed, 2.0 * done) - done, candidate.spp_step);
 }
 
 std::optional<std::size_t> cheapest(std::span<const Candidate> candidates, double tolerance, int pictures) {

@@ -39,6 +39,14 @@ struct Offer {
 inline constexpr int kMostSamples = 1 << 20;
 std::optional<Offer> offer(const Candidate& candidate, double tolerance, int pictures);
 
+/// The samples of a picture to begin with: what it needs if its noise is what it is thought to be, caution aside; the picture
+/// itself then says how many more (more_samples). At least 2, which tell of noise.
+int first_samples(const Candidate& candidate, double tolerance);
+
+/// How many samples per pixel a picture of `done` still needs, `noise_square` being what it shows itself of its own noise; 0 where
+/// it is good enough. At most as many again: more samples know better.
+int more_samples(const Candidate& candidate, const Estimate& noise_square, int done, double tolerance);
+
 /// The cheapest of those that meet the tolerance; nothing where none does.
 std::optional<std::size_t> cheapest(std::span<const Candidate> candidates, double tolerance, int pictures);
 

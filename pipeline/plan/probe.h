@@ -30,6 +30,14 @@ double mean_radiance(std::span<const FrameBuffers> blocks);
 /// Variance of one sample of a pixel, mean over pixels and channels: what a picture of n samples errs by noise is this / n.
 Estimate sample_variance(std::span<const FrameBuffers> blocks);
 
+/// The same of one whole picture. Nothing is left out, so its error is only what each pixel's own samples leave open: the spread
+/// between neighbours, whose noise is alike. Where a few bright paths make the noise, that is most of it.
+Estimate sample_variance_of_all(const FrameBuffers& frame);
+
+/// The same where the difference changes little within a block: of the blocks' means, in which far less noise is left. What changes
+/// within a block is missing.
+Estimate squared_bias_of_means(std::span<const FrameBuffers> blocks, std::span<const FrameBuffers> reference);
+
 /// bias^2 as above. [block] of the same rectangles, any number of samples.
 Estimate squared_bias(std::span<const FrameBuffers> blocks, std::span<const FrameBuffers> reference);
 

@@ -31,6 +31,8 @@ constexpr int kMostTries = 8;
 constexpr double kTableError = 0.5;
 // The same of a pilot's few pixels.
 constexpr double kPilotError = 0.4;
+// Light from one cloth to another is known well enough if its squared error is this share of the squared tolerance, or less.
+constexpr double kBetweenKnown = 0.05;
 // The pilot's random numbers are not those of the picture.
 constexpr std::uint64_t kPilotSeed = 0x9107;
 // Fabrics of one scene whose settings are chosen apart: there are up to 6 choices for each.
@@ -116,7 +118,33 @@ class ScenePlanner {
     path_setup_ = crops.setup.seconds;
     path_seconds_per_spp_ = seconds_per_spp(crops, spp);
     path_variance_ = sample_variance(paths_);
+    local_paths_ = {};
     mean_ = {mean_radiance(paths_), std::sqrt(path_variance_.value / (pilot_pixels_ * spp))};
+  }
+
+  /// Can light that has left a cloth meet cloth again?
+  bool sends_light_about() const {
+    const std::vector<ClothConfig>& cloths = plan_.scene.cloths;
+    return cloths.size() > 1 || !plan_.scene.meshes.empty() || cloths[0].mesh;
+  }
+
+  /// The same paths without what they meet beyond the cloth that they leave. All that methods lack which end light there; light
+  /// from afar is smooth.
+  void trace_local() {
+    if (!sends_light_about() || !local_paths_.empty()) return;
+    PictureRequest local = pilot_request(RenderMethod::kPath, path_spp_);
+    local.local = true;
+    local_paths_ = shoot(*job_, local).frames;
+    light_between_ = relative(squared_bias_of_means(local_paths_, paths_));
+  }
+  static bool lacks_light_between(const Way& way) { return !traces_paths(way.method) || !way.variant.stand_ins.empty(); }
+
+  /// The error of a way from that against what it claims to compute, and what it does not claim.
+  void add_up(Way& way) const {
+    way.candidate.bias_square = way.bias_square;
+    if (!lacks_light_between(way)) return;
+    way.candidate.bias_square.value += std::max(0.0, light_between_.value);
+    way.candidate.bias_square.error = std::hypot(way.candidate.bias_square.error, light_between_.error);
   }
 
   /// An absolute square relative to the mean radiance; the mean's own error counts.
@@ -292,6 +320,7 @@ class ScenePlanner {
   }
 
   void add_other_ways() {
+    trace_local();
     for (const std::set<std::size_t>& far : stand_ins()) {
       SceneVariant variant;
       variant.stand_ins = far;
@@ -435,8 +464,8 @@ class ScenePlanner {
       }
       // The cloth's light, squared, relative to the picture's: (light_share / share)^2, on `share` of the pixels.
       const double weight = of.light_share * of.light_share / of.share;
-      candidate.bias_square.value += weight * answer.bias_square.value;
-      candidate.bias_square.error += weight * answer.bias_square.error;
+      way.bias_square.value += weight * answer.bias_square.value;
+      way.bias_square.error += weight * answer.bias_square.error;
       noise += weight * answer.noise_ratio;
       noise_weight += weight;
       time += of.share * answer.time_ratio;
@@ -450,6 +479,7 @@ class ScenePlanner {
     candidate.noise_square = {noise_ratio * traced.value, noise_ratio * std::hypot(traced.error, 0.2 * traced.value)};
     candidate.seconds_per_spp = path_seconds_per_spp_ * (seen > 0 ? time / seen : 1);
     candidate.build_seconds = build_seconds(way);
+    add_up(way);
     plan_.ways.push_back(std::move(way));
   }
 
@@ -537,6 +567,15 @@ class ScenePlanner {
     plan_.request.spp = plan_.offer->spp;
   }
 
+  /// A pilot of so many samples in all, first of more pixels.
+  void trace_pilot_of(double samples) {
+    const double pixels = std::min(pixels_, samples / kPilotSamples);
+    trace_pilot(static_cast<int>(pixels), 2 * std::max(kPilotSamples / 2, static_cast<int>(samples / pixels / 2)));
+    Candidate& path = plan_.ways[0].candidate;
+    path.noise_square = relative(path_variance_);
+    path.seconds_per_spp = path_seconds_per_spp_;
+  }
+
   /// Finds out more of the way that looks cheapest; false where there is nothing to find out.
   bool learn(Way& way, const Offer& offered) {
     if (way.family == "path") {
@@ -546,15 +585,27 @@ class ScenePlanner {
       // Four times the samples, twice as sure; no more than the share.
       const double wanted = std::min(kPilotShare * planned, 16 * done);
       if (error < kNoiseKnown || wanted < 2 * done) return false;
-      const double pixels = std::min(pixels_, wanted / kPilotSamples);
-      trace_pilot(static_cast<int>(pixels), 2 * std::max(kPilotSamples / 2, static_cast<int>(wanted / pixels / 2)));
-      way.candidate.noise_square = relative(path_variance_);
-      way.candidate.seconds_per_spp = path_seconds_per_spp_;
+      trace_pilot_of(wanted);
       return true;
     }
+    if (lacks_light_between(way) && know_light_between(offered)) return true;
     if (way.tried) return false;
     if (way.candidate.build_seconds > 0 && !plan_.question.may_build) return false;
     try_out(way);
+    return true;
+  }
+
+  /// Another pilot, if light between cloths decides what is offered and is not known; false if not.
+  bool know_light_between(const Offer& offered) {
+    const double tolerance = plan_.question.tolerance;
+    const double done = pilot_pixels_ * path_spp_;
+    // Both pictures of paths count.
+    const double affordable = kPilotShare * offered.seconds / (2 * path_seconds_per_spp_ / pixels_);
+    const double wanted = std::min(affordable, 16 * done);
+    if (light_between_.error < kBetweenKnown * tolerance * tolerance || wanted < 2 * done) return false;
+    trace_pilot_of(wanted);
+    trace_local();
+    for (Way& way : plan_.ways) add_up(way);
     return true;
   }
 
@@ -576,17 +627,21 @@ class ScenePlanner {
     now.seconds_per_spp = seconds_per_spp(crops, kPilotSamples);
     now.setup_seconds = crops.setup.seconds;
     now.build_seconds = 0;  // by now it is there
-    Estimate measured = relative(squared_bias(crops.frames, paths_));
+    trace_local();
+    const bool claims_all = !lacks_light_between(way) || local_paths_.empty();
+    Estimate measured = relative(squared_bias(crops.frames, claims_all ? paths_ : local_paths_));
     // A few pixels hold most of the squares, and a pilot misses more of them than it meets: it may raise what the table says, not
     // lower it.
     measured.error = std::max(measured.error, kPilotError * std::abs(measured.value));
-    const Estimate both = combined(before.bias_square, measured);
-    if (before.bias_square.error > 0 && both.value > before.bias_square.value) now.bias_square = both;
+    const Estimate of_table = way.bias_square;
+    const Estimate both = combined(of_table, measured);
+    if (of_table.error > 0 && both.value > of_table.value) way.bias_square = both;
+    add_up(way);
     way.tried = true;
     // What differs from the table here does so for the like of it too.
     const double noise_ratio = now.noise_square.value / before.noise_square.value;
     const double time_ratio = now.seconds_per_spp / before.seconds_per_spp;
-    const double more_bias = now.bias_square.value - before.bias_square.value;
+    const double more_bias = way.bias_square.value - of_table.value;
     for (Way& other : plan_.ways) {
       if (other.tried || other.family != way.family) continue;
       Candidate& like = other.candidate;
@@ -594,7 +649,8 @@ class ScenePlanner {
                            like.noise_square.value * now.noise_square.error / now.noise_square.value};
       like.seconds_per_spp *= time_ratio;
       like.setup_seconds = now.setup_seconds;
-      like.bias_square.value = std::max(0.0, like.bias_square.value + more_bias);
+      other.bias_square.value = std::max(0.0, other.bias_square.value + more_bias);
+      add_up(other);
       like.build_seconds = build_seconds(other);
     }
   }
@@ -612,7 +668,9 @@ class ScenePlanner {
   std::map<std::pair<fs::path, std::string>, AccuracyTable> surfaces_;
 
   std::vector<PixelRect> blocks_;
-  std::vector<FrameBuffers> paths_;  // [block]
+  std::vector<FrameBuffers> paths_;        // [block]
+  std::vector<FrameBuffers> local_paths_;  // [block] the same, local; empty until asked for, or where all are
+  Estimate light_between_;                 // squared, of what is not local
   double pilot_pixels_ = 0;
   int path_spp_ = 0;
   double path_setup_ = 0;

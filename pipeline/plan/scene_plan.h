@@ -8,6 +8,8 @@
 //                                  what their data take to build
 //   the cache                      which data are there already
 //   more pilots                    of the way that looks cheapest, where its data are there or may be built
+//   light between cloths           (and between slopes of one): paths of the pilot with and without what they meet beyond the cloth
+//                                  that they leave; all of it is missing from dual scattering and the precomputed methods
 //
 // Ways: path tracing, 6 scattering events of it, dual scattering; and the precomputed methods with, for each fabric, the size of
 // its cells and the order of its transfer, voxels, and the form of visibility of the Gaussian lights; each also with the farthest
@@ -43,6 +45,7 @@ struct Way {
       family;  // "path", "path-6", "dual-scattering", "exact", "volume"; with "+ surfaces" where some cloth is one
   RenderMethod method = RenderMethod::kPath;
   SceneVariant variant;
+  Estimate bias_square;  // against what the method claims to compute: the candidate's without the light between cloths
   Candidate candidate;
   bool tried = false;  // its noise and speed are this view's own, by a pilot
 };
