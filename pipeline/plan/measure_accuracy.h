@@ -6,8 +6,8 @@
 // Four pairs of view and light, five sharpnesses; each a picture of 64 x 64 pixels as wide as a fiber. Errors of wider pixels
 // come from the same pictures: differences, averaged over squares of pixels, before they are squared. Path tracing and method
 // share their eye rays (probe.h). Squares of the four pairs are added before they are divided by the squared mean radiance, as in
-// a picture that shows all four. Folds bring light that grazes and shadows that end: two pairs, pixels of a few millimetres, many
-// samples each. Paths end where they leave the cloth's shell: what other cloth, or another slope, sends is a matter of the scene, not
+// a picture that shows all four. Folds bring light that grazes and shadows that end: two pairs, pixels of 6 mm (errors of folds
+// are wide, and noise averages), many samples each. Paths end where they leave the cloth's shell: what other cloth, or another slope, sends is a matter of the scene, not
 // of the fabric (scene_plan.h).
 // Settings, all else as the fabric says:
 //   path, path-6, dual-scattering             nothing baked
@@ -56,10 +56,10 @@ Transfer cut_to_order(const Transfer& transfer, int order);
 /// How much is measured; less is for tests.
 struct AccuracyEffort {
   int pixels = 64;        // along an edge of a flat picture, a power of two of at least 32
-  int bent_pixels = 16;   // of a folded one
+  int bent_pixels = 8;    // of a folded one
   int path_samples = 16;  // per pixel, flat; `bent_factor` times as many in folds; even
   int method_samples = 4;
-  int bent_factor = 8;
+  int bent_factor = 64;
 };
 
 /// Called with the share done, 0 .. 1; may throw to stop.

@@ -2,10 +2,11 @@
 """Plans held against charts: for every scene of a list, the picture that `heddle render --tolerance` makes, its error against the
 chart's path-traced reference, and its cost beside the cheapest run of the chart that meets the same tolerance.
 
-    tests/bench/plan_scenes.py build/release/heddle [FOLDER] [-o OUT] [--reference-spp N] [--core-seconds]
+    tests/bench/plan_scenes.py build/release/heddle [FOLDER] [-o OUT] [--scenes a,b] [--core-seconds]
 
 FOLDER (tests/bench/plan_scenes where absent) holds NAME.toml and list.json: [{"scene": NAME, "tolerance": X, "pictures": N,
-"cached": BOOL}]. cached: the fabric's data are there, and rendering alone is the cost; otherwise the cache holds the accuracy tables
+"cached": BOOL,
+"reference_spp": N}]. cached: the fabric's data are there, and rendering alone is the cost; otherwise the cache holds the accuracy tables
 only, and building what a plan or a run needs counts once, rendering N times. The plan's own time always counts, once. Times are
 wall clock, for an idle machine; --core-seconds counts processor time, which other work on the machine disturbs less. Charts in OUT
 are kept and used again.
@@ -50,7 +51,7 @@ def main():
     parser.add_argument("program")
     parser.add_argument("folder", nargs="?", type=pathlib.Path, default=pathlib.Path(__file__).parent / "plan_scenes")
     parser.add_argument("-o", "--output", type=pathlib.Path, default=pathlib.Path("out/plan_scenes"))
-    parser.add_argument("--reference-spp", type=int, default=1024)
+    parser.add_argument("--scenes", type=lambda names: names.split(","))
     parser.add_argument("--core-seconds", action="store_true")
     arguments = parser.parse_args()
     seconds = "core_seconds" if arguments.core_seconds else "seconds"
@@ -62,11 +63,13 @@ def main():
     print("| scene | tolerance | pictures | data | choice | error | cost (s) | of it the plan | best of the chart (s) | ratio |")
     print("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |")
     for entry in json.loads((folder / "list.json").read_text()):
+        if arguments.scenes and entry["scene"] not in arguments.scenes:
+            continue
         scene = folder / f'{entry["scene"]}.toml'
         tolerance, pictures, cached = entry["tolerance"], entry["pictures"], entry["cached"]
         chart_folder = output / entry["scene"]
         heddle(program, "chart", scene, "-o", chart_folder, "--cache", cache, "--resume", "-q", "--methods", METHODS,
-               "--reference-spp", arguments.reference_spp)
+               "--reference-spp", entry["reference_spp"])
         chart = json.loads((chart_folder / "chart.json").read_text())
         for cloth in tomllib.loads(scene.read_text())["cloth"]:
             if "fabric" in cloth:
@@ -96,14 +99,14 @@ def main():
         cost = build + plan + pictures * made[seconds]
         best = best_of_chart(chart["rows"], tolerance, pictures, cached, seconds)
         choice = report["plan"]["choice"]
-        result = {**entry, "choice": choice["name"], "spp": choice["spp"], "error": error, "expected_error": report["expected_error"],
+        result = {**entry, "choice": choice["name"], "spp": made["heddle.spp"], "error": error, "expected_error": report["expected_error"],
                   "bias": choice["bias"], "noise_of_a_sample": choice["noise_of_a_sample"],
                   "build_seconds": build, "plan_seconds": plan, "render_seconds": made[seconds], "cost": cost,
                   "best_cost": best[0] if best else None, "best": best[1] if best else None}
         results.append(result)
         against = f"{best[0]:.2f} ({best[1]}) | {cost / best[0]:.2f}" if best else "none meets it |"
         print(f'| {entry["scene"]} | {tolerance:.0%} | {pictures} | {"there" if cached else "to build"} | {choice["name"]}, '
-              f'{choice["spp"]} spp | {error:.1%} (expected {report["expected_error"]:.1%}) | {cost:.2f} | {plan:.2f} | {against} |', flush=True)
+              f'{made["heddle.spp"]} spp | {error:.1%} (expected {report["expected_error"]:.1%}) | {cost:.2f} | {plan:.2f} | {against} |', flush=True)
     (output / "results.json").write_text(json.dumps(results, indent=1) + "\n")
     within = sum(r["error"] <= r["tolerance"] for r in results)
     near = sum(r["best_cost"] is None or r["cost"] <= 2 * r["best_cost"] for r in results)

@@ -600,6 +600,39 @@ TEST(PlanEndToEnd, AsksForNoTableWhereAFewPathsDo) {
   EXPECT_FALSE(fs::exists(shop / "cache" / "accuracy"));
 }
 
+/// What a plan thinks that a way errs by, apart from noise.
+double bias_in(const Json& plan, const std::string& name) {
+  for (const Json& way : plan.at("considered")) {
+    if (way.at("name") == name) return way.at("bias").get<double>();
+  }
+  ADD_FAILURE() << "no way called " << name;
+  return NAN;
+}
+
+TEST(PlanEndToEnd, LightFromOtherClothIsMissingFromFastMethods) {
+  const Workshop shop;
+  store_table(shop, 0.2);
+  // A wall of the same cloth beside what the picture shows, lit from the front; then the same one far away.
+  const auto plan_with_wall_at = [&](double x) {
+    std::ofstream obj(shop / "wall.obj");
+    for (const auto& [y, z] : {std::pair{-2, 0}, {2, 0}, {2, 3}, {-2, 3}}) {
+      obj << "v " << x << ' ' << y << ' ' << z << "\nvt " << y << ' ' << z << "\nvn 1 0 0\n";
+    }
+    obj << "f 1/1/1 2/2/2 3/3/3\nf 1/1/1 3/3/3 4/4/4\n";
+    obj.close();
+    std::ofstream(shop / "scene.toml") << kSmallScene
+                                       << "\n[[cloth]]\nmesh = \"wall.obj\"\nmesh_unit = \"mm\"\nuv_size_mm = 1\n"
+                                          "fabric = \"fabric.toml\"\n";
+    return plan_of(shop, "4e-1", 0);
+  };
+  const Json near = plan_with_wall_at(-0.4);
+  const Json far = plan_with_wall_at(-400);
+  EXPECT_GT(bias_in(near, "exact"), 1.1 * bias_in(far, "exact"));
+  EXPECT_GT(bias_in(near, "dual-scattering"), bias_in(far, "dual-scattering"));
+  EXPECT_NEAR(bias_in(near, "path-6") / bias_in(far, "path-6"), 1, 0.01) << "traces light from everywhere";
+  EXPECT_EQ(bias_in(near, "path"), 0);
+}
+
 TEST(PlanEndToEnd, SaysWhatIsOutOfReach) {
   const Workshop shop;
   store_table(shop, 0.2);
@@ -634,6 +667,18 @@ TEST(RenderEndToEnd, WithinTheToleranceFromWhatWasPlanned) {
   const Json error = shop.report({"compare", "out.exr", "reference.exr"});
   EXPECT_LE(error.at("relative_rmse"), 1.2);
   EXPECT_LE(report.at("expected_error"), 1.2);
+}
+
+TEST(RenderEndToEnd, ThePictureOfATolerance) {
+  const Workshop shop;
+  const Json report = shop.report({"render", "scene.toml", "-o", "out.exr", "--tolerance", "5e-1"});
+  ASSERT_EQ(report.at("plan").at("choice").at("method"), "path");
+  EXPECT_LE(report.at("expected_error"), 0.5);
+  EXPECT_GT(report.at("expected_error"), 0.3) << "far more samples than it takes";
+  // Begun with fewer samples and carried on as its noise asked for, it has the key and the bytes of one with as many at once.
+  const std::string taken = read_exr(shop / "out.exr").metadata.at("heddle.spp");
+  ASSERT_EQ(shop.run({"render", "scene.toml", "-o", "same.exr", "--method", "path", "--spp", taken}).status, 0);
+  EXPECT_EQ(text_of(shop / "out.exr"), text_of(shop / "same.exr"));
 }
 
 TEST(RunEndToEnd, ReferenceHasRandomNumbersOfItsOwn) {

@@ -63,6 +63,29 @@ TEST(Plan, WhatIsNotKnownCostsSamples) {
   EXPECT_GT(offer(unsure, 0.2, 1)->spp, offer(sure, 0.2, 1)->spp);
 }
 
+TEST(Plan, PicturesGoOnUntilTheirOwnNoiseIsSmallEnough) {
+  for (const Candidate& of : kCandidates) {
+    const double tolerance = 0.4;
+    int spp = first_samples(of, tolerance);
+    EXPECT_LE(spp, offer(of, tolerance, 1)->spp);
+    EXPECT_EQ(spp % of.spp_step, 0);
+    EXPECT_GE(spp, 2);
+    // Four times the variance that the candidate was thought to have, and not quite sure of it.
+    const Estimate noise = {4 * of.noise_square.value, 0.2 * of.noise_square.value};
+    for (int more = 1; more > 0; spp += more) {
+      more = more_samples(of, noise, spp, tolerance);
+      EXPECT_LE(more, spp + of.spp_step);
+      EXPECT_EQ(more % of.spp_step, 0);
+    }
+    EXPECT_LE(std::sqrt(of.bias_square.value + noise.value / spp), tolerance) << of.name;
+    EXPECT_GT(std::sqrt(of.bias_square.value + noise.value / (0.7 * spp)), tolerance) << of.name;
+    EXPECT_EQ(more_samples(of, {0.1 * of.noise_square.value, 0}, spp, tolerance), 0);
+    EXPECT_GT(more_samples(of, {noise.value, 10 * noise.value}, spp, tolerance), 0) << "noise hardly known";
+  }
+  EXPECT_EQ(more_samples(kCandidates[2], {100, 0}, 8, 0.2), 0) << "no number of samples helps against the bias";
+  EXPECT_EQ(more_samples(kCandidates[0], {1e9, 0}, kMostSamples, 0.2), 0);
+}
+
 TEST(Plan, CheapestThatIsGoodEnough) {
   const auto name_at = [](double tolerance, int pictures) {
     return kCandidates[cheapest(kCandidates, tolerance, pictures).value()].name;
@@ -187,6 +210,62 @@ TEST(ProbeStatistical, BiasIsFoundUnderNoise) {
     EXPECT_NEAR(square.value, bias * bias, 4 * square.error) << bias;
     EXPECT_LT(square.error, 0.01) << "noise of common eye rays drops out";
   }
+}
+
+TEST(ProbeStatistical, SmoothDifferencesAreFoundUnderMuchNoise) {
+  const Drawn drawn = draw(0, 0, 5.0, 8);
+  std::vector<FrameBuffers> brighter = drawn.picture;
+  for (FrameBuffers& frame : brighter) {
+    for (std::vector<Rgb>* half : {&frame.half0, &frame.half1}) {
+      for (Rgb& value : *half) value += 0.3F;
+    }
+  }
+  const Estimate square = squared_bias_of_means(brighter, drawn.reference);
+  EXPECT_NEAR(square.value, 0.09, 4 * square.error);
+  // Of a block's half, of 64 pixels and 4 samples, in each of two pictures; and its product with the difference.
+  const double variance = 2 * 25.0 / (64 * 4);
+  EXPECT_LT(square.error, 2 * std::sqrt((variance * variance + 2 * variance * 0.09) / 64));
+  EXPECT_GT(squared_bias(brighter, drawn.reference).error, 5 * square.error);
+}
+
+/// A picture of 64 x 64 pixels with so many samples, whose noise doubles every 32 columns and of which a share of samples is bright.
+FrameBuffers noisy(int samples, double share_of_bright, double bright, std::uint32_t seed) {
+  std::mt19937 engine(seed);
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> uniform;
+  FrameBuffers frame(64, 64);
+  frame.spp = samples;
+  frame.half0.resize(64 * 64);
+  frame.half1.resize(64 * 64);
+  frame.variance.resize(64 * 64);
+  for (std::size_t k = 0; k < frame.pixel_count(); ++k) {
+    PixelSums sums;
+    for (int s = 0; s < samples; ++s) {
+      const double spread = k % 64 < 32 ? 1 : 2;
+      const auto value =
+          static_cast<float>(1 + spread * normal(engine) + (uniform(engine) < share_of_bright ? bright : 0));
+      sums.add({Rgb(value, value, value), Rgb::Zero(), Rgb::Zero(), 1}, s);
+    }
+    sums.store(samples, k, frame);
+  }
+  return frame;
+}
+
+TEST(ProbeStatistical, APictureKnowsHowWellItKnowsItsNoise) {
+  // Known noise, half of the pixels with 1 and half with 4: no error but that of each pixel's 15 degrees of freedom.
+  const Estimate even = sample_variance_of_all(noisy(16, 0, 0, 3));
+  EXPECT_NEAR(even.value, 2.5, 4 * even.error);
+  EXPECT_NEAR(even.error, std::sqrt((1 + 16) / 2.0 * 2 / 15 / 4096), 0.1 * even.error);
+  // Every 3000th sample is brighter by 200: of the variance 13.3 of it, known from about 22 of them, to 1 / sqrt(22).
+  double within = 0;
+  for (std::uint32_t seed = 0; seed < 40; ++seed) {
+    const Estimate rare = sample_variance_of_all(noisy(16, 1 / 3000.0, 200, 100 + seed));
+    EXPECT_GT(rare.error, 0.1 * rare.value) << seed;
+    EXPECT_LT(rare.error, 0.5 * rare.value) << seed;
+    if (std::abs(rare.value - (2.5 + 200 * 200 / 3000.0)) < rare.error) ++within;
+  }
+  // Of 40, 27 are expected within one standard error.
+  EXPECT_NEAR(within / 40, 0.68, 4 * std::sqrt(0.68 * 0.32 / 40));
 }
 
 AccuracyTable small_table() {

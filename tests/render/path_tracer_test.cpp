@@ -232,14 +232,15 @@ CameraConfig small_camera() {
   return camera;
 }
 
-FrameBuffers small_picture(const PixelRect& crop, int spp) {
+FrameBuffers small_picture(const PixelRect& crop, int spp, const MoreSamples& more = {}) {
   const World world = make_world(crossed_layers(test_cotton()), {curved_patch()},
                                  {sg_light({-0.4F, 0.3F, 1}, 150, Rgb(3, 3, 3)),
                                   {LightType::kDirectional, Vec3(0.6F, 0, 0.8F), 0, Rgb(1, 1, 1)}});
   const PathTracer tracer = world.tracer(LightEstimator::kCombined);
   double last = -1;
-  return trace_picture(tracer, Camera(small_camera()), crop, 5, {spp, {}}, [&](double share) {
-    EXPECT_GE(share, last);
+  return trace_picture(tracer, Camera(small_camera()), crop, 5, {spp, {}, more}, [&](double share) {
+    // More samples begin anew.
+    EXPECT_TRUE(share >= last || more);
     last = share;
   });
 }
@@ -271,6 +272,22 @@ TEST(PathTracerEndToEnd, ThreadsAndCropsDoNotChangeAPixel) {
                       .all());
     }
   }
+}
+
+TEST(PathTracerEndToEnd, MoreSamplesMakeThePictureOfAll) {
+  const PixelRect all = {0, 0, 24, 16};
+  std::vector<int> seen;
+  const FrameBuffers grown = small_picture(all, 6, [&](const FrameBuffers& frame) {
+    EXPECT_TRUE(same(frame.variance, small_picture(all, frame.spp).variance));
+    seen.push_back(frame.spp);
+    return seen.size() == 1 ? 10 : seen.size() == 2 ? 4 : 0;
+  });
+  EXPECT_EQ(seen, (std::vector<int>{6, 16, 20}));
+  const FrameBuffers whole = small_picture(all, 20);
+  EXPECT_EQ(grown.spp, 20);
+  EXPECT_TRUE(same(grown.beauty, whole.beauty));
+  EXPECT_TRUE(same(grown.half1, whole.half1));
+  EXPECT_TRUE(same(grown.variance, whole.variance));
 }
 
 // What the buffers say of themselves: the halves average to the beauty, single and multiple add up to it, and

@@ -305,6 +305,27 @@ TEST(PrecomputedRendererAgreement, VolumeSeesWhatFibersShow) {
   EXPECT_GT(near, 0.97 * same_fiber);
 }
 
+TEST(PrecomputedRendererEndToEnd, MoreSamplesMakeThePictureOfAll) {
+  const auto world = make_world(open_pack(test_cotton()),
+                                {directional({0.3F, 0.2F, 1}, 1), gaussian({-0.5F, 0, 1}, 150, 2)}, {half_roof()});
+  const Camera camera = camera_above(2, 20, 20);
+  const FrameBuffers whole = shade_picture(world->renderer(), camera, {0, 0, 20, 20}, 13, kNoProgress);
+  std::vector<int> seen;
+  const FrameBuffers grown =
+      shade_picture(world->renderer(), camera, {0, 0, 20, 20}, 3, kNoProgress, [&](const FrameBuffers& frame) {
+        seen.push_back(frame.spp);
+        return 13 - frame.spp;
+      });
+  EXPECT_EQ(seen, (std::vector<int>{3, 13}));
+  EXPECT_EQ(grown.spp, 13);
+  for (std::size_t k = 0; k < whole.pixel_count(); ++k) {
+    ASSERT_TRUE((grown.beauty[k] == whole.beauty[k]).all() && (grown.half0[k] == whole.half0[k]).all());
+    ASSERT_TRUE((grown.variance[k] == whole.variance[k]).all());
+    ASSERT_EQ(grown.segment[k], whole.segment[k]);
+    ASSERT_EQ(grown.depth[k], whole.depth[k]);
+  }
+}
+
 TEST(PrecomputedRendererEndToEnd, SameBytesForAnyThreadsAndCrop) {
   const auto world = make_world(open_pack(test_cotton()),
                                 {directional({0.3F, 0.2F, 1}, 1), gaussian({-0.5F, 0, 1}, 150, 2)}, {half_roof()});
