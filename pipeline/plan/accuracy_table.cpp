@@ -90,7 +90,6 @@ Accuracy AccuracyTable::at(const std::string& name, double light_sharpness, doub
 
 Accuracy AccuracyTable::at_bent(const std::string& name, double light_sharpness) const {
   const SettingAccuracy& of = setting(name);
-  if (of.bent.empty()) throw FileError(fmt::format("accuracy of {}: nothing about \"{}\" in folds", fabric, name));
   const Place light = place_of(sharpness, light_sharpness);
   Accuracy result = kNothing;
   add_weighted(of.bent[light.low], 1 - light.share, result);
@@ -156,7 +155,7 @@ AccuracyTable read_accuracy(const std::filesystem::path& path) {
       setting.setup_seconds = entry.at("setup_seconds").get<double>();
       setting.entries = entries_of(entry.at("entries"));
       setting.bent = entries_of(entry.at("bent"));
-      if (setting.entries.size() != count || (!setting.bent.empty() && setting.bent.size() != table.sharpness.size())) {
+      if (setting.entries.size() != count || setting.bent.size() != table.sharpness.size()) {
         throw FileError(path.string() + ": entries of " + setting.name + " are missing");
       }
       table.settings.push_back(std::move(setting));
@@ -185,11 +184,7 @@ std::string accuracy_text(const AccuracyTable& table) {
       };
       for (std::size_t f = 0; f < table.footprint_mm.size(); ++f)
         add(setting.entries[l * table.footprint_mm.size() + f]);
-      if (setting.bent.empty()) {
-        text += fmt::format("{:>12}", "");
-      } else {
-        add(setting.bent[l]);
-      }
+      add(setting.bent[l]);
       text += l == 0 ? fmt::format("{:>15.3g}\n", 1e6 * setting.seconds_per_sample) : "\n";
     }
   }

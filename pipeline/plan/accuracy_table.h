@@ -33,7 +33,7 @@ struct SettingAccuracy {
   double seconds_per_sample = 0;
   double setup_seconds = 0;       // per picture
   std::vector<Accuracy> entries;  // [light][footprint], flat
-  std::vector<Accuracy> bent;     // [light], a folded swatch in pixels of bent_footprint_mm; of methods, else empty
+  std::vector<Accuracy> bent;     // [light], a folded swatch in pixels of bent_footprint_mm
 };
 
 struct AccuracyTable {

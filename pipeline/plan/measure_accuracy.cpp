@@ -251,8 +251,8 @@ class TableMaker {
     for (int level = 0; level < kLevels; ++level) table_.footprint_mm.push_back(std::ldexp(swatch.pixel_mm(), level));
   }
 
-  /// The first setting is the reference of all. In folds only what all settings of a method have in common is measured.
-  void add(const std::string& name, const Shoot& shoot, bool in_folds) {
+  /// The first setting is the reference of all.
+  void add(const std::string& name, const Shoot& shoot) {
     SettingAccuracy setting;
     setting.name = name;
     double samples = 0;
@@ -280,11 +280,10 @@ class TableMaker {
       for (const Sums& sums : levels) setting.entries.push_back(accuracy_of(sums));
       Sums bent;
       for (std::size_t pair = 0; pair < std::size(kBentPairs); ++pair, ++picture) {
-        if (!in_folds) continue;
         const Camera camera = Swatch::bent_camera(pair, swatch_->effort().bent_pixels);
         bent.add(compare_with(picture, camera, light_of(sharpness, kBentPairs[pair]), true, 1)[0]);
       }
-      if (in_folds) setting.bent.push_back(accuracy_of(bent));
+      setting.bent.push_back(accuracy_of(bent));
     }
     setting.setup_seconds /= static_cast<double>(shots);
     setting.seconds_per_sample /= samples;
@@ -320,7 +319,6 @@ Shoot paths(const Swatch& swatch, int flat_samples, int max_scatterings) {
     const int samples = flat_samples * (bent ? swatch.effort().bent_factor : 1);
     PathTracerSettings settings;
     settings.seed = swatch.seed();
-    settings.local = true;
     if (max_scatterings > 0) settings.limits.max_scatterings = max_scatterings;
     Shot shot;
     const Stopwatch setup;
@@ -408,28 +406,28 @@ AccuracyTable measure_accuracy(AccuracyData& data, std::uint64_t seed, const Acc
     change(settings);
     return precomputed(swatch, pack, settings);
   };
-  maker.add("path", paths(swatch, effort.path_samples, 0), true);
-  maker.add("path-6", paths(swatch, effort.method_samples, 6), true);
-  maker.add("dual-scattering", with([](auto& settings) { settings.shading = LocalShading::kDualScattering; }), true);
-  maker.add("exact", precomputed(swatch, pack, usual), true);
-  maker.add("volume", with([](auto& settings) { settings.volume = true; }), true);
-  maker.add(kDistanceSetting, with([](auto& settings) { settings.blend = kSignedDistanceOnly; }), false);
-  maker.add(kGaussiansSetting, with([](auto& settings) { settings.blend = kLobesOnly; }), false);
+  maker.add("path", paths(swatch, effort.path_samples, 0));
+  maker.add("path-6", paths(swatch, effort.method_samples, 6));
+  maker.add("dual-scattering", with([](auto& settings) { settings.shading = LocalShading::kDualScattering; }));
+  maker.add("exact", precomputed(swatch, pack, usual));
+  maker.add("volume", with([](auto& settings) { settings.volume = true; }));
+  maker.add(kDistanceSetting, with([](auto& settings) { settings.blend = kSignedDistanceOnly; }));
+  maker.add(kGaussiansSetting, with([](auto& settings) { settings.blend = kLobesOnly; }));
   // Settings of the data: the other data take the place of the pack's while a setting is measured.
   const Transfer own = *pack.transfer;
   for (const int other : kOtherOrders) {
     if (other >= order) continue;
     pack.transfer = cut_to_order(own, other);
-    maker.add(order_setting(other), precomputed(swatch, pack, usual), false);
+    maker.add(order_setting(other), precomputed(swatch, pack, usual));
   }
   for (auto& [factor, transfer] : data.cells) {
     pack.transfer = transfer;
-    maker.add(cells_setting(factor), precomputed(swatch, pack, usual), false);
+    maker.add(cells_setting(factor), precomputed(swatch, pack, usual));
   }
   pack.transfer = own;
   for (auto& [factor, volume] : data.voxels) {
     std::swap(*pack.volume, volume);
-    maker.add(voxels_setting(factor), with([](auto& settings) { settings.volume = true; }), false);
+    maker.add(voxels_setting(factor), with([](auto& settings) { settings.volume = true; }));
     std::swap(*pack.volume, volume);
   }
   return maker.take();
@@ -440,9 +438,9 @@ AccuracyTable measure_surface_accuracy(const Exemplar& exemplar, const SurfaceFa
   Swatch swatch(exemplar, seed, effort);
   TableMaker maker(swatch, 2, progress);
   swatch.use_fibers(std::make_shared<const TileScene>(exemplar));
-  maker.add("path", paths(swatch, effort.path_samples, 0), true);
+  maker.add("path", paths(swatch, effort.path_samples, 0));
   swatch.use_surface(surface);
-  maker.add(surface_setting(surface.name), paths(swatch, effort.method_samples, 0), true);
+  maker.add(surface_setting(surface.name), paths(swatch, effort.method_samples, 0));
   return maker.take();
 }
 

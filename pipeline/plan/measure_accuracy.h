@@ -6,9 +6,8 @@
 // Four pairs of view and light, five sharpnesses; each a picture of 64 x 64 pixels as wide as a fiber. Errors of wider pixels
 // come from the same pictures: differences, averaged over squares of pixels, before they are squared. Path tracing and method
 // share their eye rays (probe.h). Squares of the four pairs are added before they are divided by the squared mean radiance, as in
-// a picture that shows all four. Folds bring light that grazes and shadows that end: two pairs, pixels of 6 mm (errors of folds
-// are wide, and noise averages), many samples each. Paths end where they leave the cloth's shell: what other cloth, or another slope, sends is a matter of the scene, not
-// of the fabric (scene_plan.h).
+// a picture that shows all four. Folds bring light that grazes, shadows that end, and light from one slope to the next: two pairs,
+// pixels of 6 mm (errors of folds are wide, and noise averages), many samples each.
 // Settings, all else as the fabric says:
 //   path, path-6, dual-scattering             nothing baked
 //   exact, volume                             everything

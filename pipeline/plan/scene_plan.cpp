@@ -408,13 +408,20 @@ class ScenePlanner {
     for (const LightShare& light : lights_of_cloth_[cloth]) {
       const auto at = [&](const std::string& setting) { return table.at(setting, light.sharpness, footprint); };
       const Accuracy base = at(settings.base);
+      const bool is_bent = plan_.scene.cloths[cloth].mesh.has_value();
+      const auto folded = [&](const std::string& setting) { return table.at_bent(setting, light.sharpness); };
       double square = base.bias_square;
-      for (const auto& [setting, of] : settings.changes) square += at(setting).bias_square - at(of).bias_square;
+      for (const auto& [setting, of] : settings.changes) {
+        const double change = at(setting).bias_square - at(of).bias_square;
+        // Where light grazes, a setting may matter more.
+        const double in_folds = folded(setting).bias_square - folded(of).bias_square;
+        square += is_bent ? std::max(change, in_folds) : change;
+      }
       square = std::max(0.0, square);
       // What folds add to a flat swatch seen from as far.
-      if (plan_.scene.cloths[cloth].mesh) {
+      if (is_bent) {
         const double flat = table.at(settings.base, light.sharpness, table.bent_footprint_mm).bias_square;
-        const Accuracy bent = table.at_bent(settings.base, light.sharpness);
+        const Accuracy bent = folded(settings.base);
         square += std::max(0.0, bent.bias_square - std::max(0.0, flat));
         error += light.weight * light.weight * bent.bias_square_error;
       }
