@@ -11,7 +11,9 @@
 #include <sstream>
 
 #include "formats/image_file.h"
+#include "pipeline/picture_request.h"
 #include "pipeline/plan/accuracy_table.h"
+#include "pipeline/scene_job.h"
 #include "pipeline/stages.h"
 #include "pipeline/work_time.h"
 #include "tests/pipeline/program.h"
@@ -669,16 +671,25 @@ TEST(RenderEndToEnd, WithinTheToleranceFromWhatWasPlanned) {
   EXPECT_LE(report.at("expected_error"), 1.2);
 }
 
-TEST(RenderEndToEnd, ThePictureOfATolerance) {
+TEST(RenderEndToEnd, MoreSamplesMakeThePictureOfAll) {
   const Workshop shop;
-  const Json report = shop.report({"render", "scene.toml", "-o", "out.exr", "--tolerance", "5e-1"});
-  ASSERT_EQ(report.at("plan").at("choice").at("method"), "path");
-  EXPECT_LE(report.at("expected_error"), 0.5);
-  EXPECT_GT(report.at("expected_error"), 0.3) << "far more samples than it takes";
-  // Begun with fewer samples and carried on as its noise asked for, it has the key and the bytes of one with as many at once.
-  const std::string taken = read_exr(shop / "out.exr").metadata.at("heddle.spp");
-  ASSERT_EQ(shop.run({"render", "scene.toml", "-o", "same.exr", "--method", "path", "--spp", taken}).status, 0);
-  EXPECT_EQ(text_of(shop / "out.exr"), text_of(shop / "same.exr"));
+  std::ostringstream silent;
+  Console console(silent, false, true);
+  StageContext context{.cache = Cache(shop / "cache"), .console = &console, .seed = {}, .results = {}};
+  SceneJob job(shop / "scene.toml", context);
+  for (const RenderMethod method : {RenderMethod::kPath, RenderMethod::kExact}) {
+    PictureRequest request = job.request(find_view(job.config(), ""));
+    request.method = method;
+    request.spp = 10;
+    const PictureResult whole = job.render(request, "whole");
+    request.spp = 4;
+    request.more = [](const FrameBuffers& frame) { return frame.spp < 10 ? 2 : 0; };
+    const PictureResult grown = job.render(request, "grown");
+    EXPECT_EQ(grown.image.metadata, whole.image.metadata) << "its key among them";
+    write_exr(shop / "whole.exr", whole.image);
+    write_exr(shop / "grown.exr", grown.image);
+    EXPECT_EQ(text_of(shop / "grown.exr"), text_of(shop / "whole.exr"));
+  }
 }
 
 TEST(RunEndToEnd, ReferenceHasRandomNumbersOfItsOwn) {
