@@ -88,9 +88,9 @@ int render_within(double tolerance, const RenderOptions& options, Job& job) {
   PictureResult picture = scene.render(request, "render");
   const double noise = std::sqrt(noise_square.value / spp);
   const double error = std::hypot(std::sqrt(std::max(0.0, way.candidate.bias_square.value)), noise);
-  const std::string done = fmt::format(
-      "{}, {} spp in {:.3g} s: expected error {:.3g} %, of that noise {:.3g} %, as the picture shows",
-      way.candidate.name, spp, picture.report.at("seconds").get<double>(), 100 * error, 100 * noise);
+  const std::string done =
+      fmt::format("{}, {} spp in {:.3g} s: expected error {:.3g} %, of that noise {:.3g} %, as the picture shows",
+                  way.candidate.name, spp, picture.report.at("seconds").get<double>(), 100 * error, 100 * noise);
   if (error > tolerance) {
     job.console().warn(done + fmt::format("; more than the {:.3g} % asked for", 100 * tolerance));
   } else {

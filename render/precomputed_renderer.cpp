@@ -293,8 +293,8 @@ void PrecomputedRenderer::shade(const Camera& camera, const PixelRect& block, in
   }
 }
 
-FrameBuffers shade_picture(const PrecomputedRenderer& renderer, const Camera& camera, const PixelRect& crop,
-                           int spp, const RenderProgress& progress, const MoreSamples& more) {
+FrameBuffers shade_picture(const PrecomputedRenderer& renderer, const Camera& camera, const PixelRect& crop, int spp,
+                           const RenderProgress& progress, const MoreSamples& more) {
   FrameBuffers frame(crop.width, crop.height);
   const std::size_t count = frame.pixel_count();
   frame.segment.assign(count, PrecomputedRenderer::Seen::kNone);

@@ -137,7 +137,9 @@ class ScenePlanner {
     local_paths_ = shoot(*job_, local).frames;
     light_between_ = relative(squared_bias_of_means(local_paths_, paths_));
   }
-  static bool lacks_light_between(const Way& way) { return !traces_paths(way.method) || !way.variant.stand_ins.empty(); }
+  static bool lacks_light_between(const Way& way) {
+    return !traces_paths(way.method) || !way.variant.stand_ins.empty();
+  }
 
   /// The error of a way from that against what it claims to compute, and what it does not claim.
   void add_up(Way& way) const {
