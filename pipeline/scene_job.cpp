@@ -24,7 +24,7 @@ namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
 // Version of what all render methods compute; part of every picture's key.
-constexpr int kPictureVersion = 1;
+constexpr int kPictureVersion = 2;
 
 std::string camera_text(const CameraConfig& camera) {
   const auto list = [](const Vec3d& v) { return fmt::format("{},{},{}", v.x(), v.y(), v.z()); };
@@ -130,8 +130,12 @@ PictureRequest SceneJob::reference_request(const ViewConfig& view) const {
   return reference;
 }
 
+VisibilityBlend SceneJob::blend_for(RenderMethod method) const {
+  return method == RenderMethod::kPrinted ? kPrintedBlend : variant_.blend;
+}
+
 Needs SceneJob::needs_for(RenderMethod method, const fs::path& fabric) const {
-  Needs needs = needs_of(method, config_.lights, variant_.blend);
+  Needs needs = needs_of(method, config_.lights, blend_for(method));
   needs.order = variant_.of(fabric).order;
   return needs;
 }
@@ -251,7 +255,7 @@ std::unique_ptr<SceneJob::Shading> SceneJob::shading_for(const PictureRequest& r
                                      .shading = shading_of(request.method),
                                      .volume = request.method == RenderMethod::kVolume,
                                      .shadow_sigma_mm = config_.shadow_sigma_mm,
-                                     .blend = variant_.blend,
+                                     .blend = blend_for(request.method),
                                      .interactive = loaded.interactive};
   shading->renderer.emplace(*loaded.scene, packs, config_.lights, config_.background, settings);
   return shading;
@@ -282,7 +286,7 @@ PictureResult SceneJob::render(const PictureRequest& request, const std::string&
   const Loaded& loaded = loaded_for(request.method);
   const Camera camera(request.camera);
 
-  PictureSetup setup{loaded.scene.get(), {}, config_.lights, &camera, request.crop, request.method, variant_.blend};
+  PictureSetup setup{loaded.scene.get(), {}, config_.lights, &camera, request.crop, request.method, blend_for(request.method)};
   setup.interactive_surfaces = !traces_paths(request.method) && !surface_stages().keys().empty();
   std::vector<const FabricPack*> packs;
   for (const ClothConfig& cloth : config_.cloths) {

@@ -101,6 +101,8 @@ class SceneJob {
  private:
   struct Loaded;
   struct Shading;
+  /// The variant's, but the paper's own for `printed`.
+  VisibilityBlend blend_for(RenderMethod method) const;
   Needs needs_for(RenderMethod method, const std::filesystem::path& fabric) const;
   std::unique_ptr<Shading> shading_for(const PictureRequest& request);
   using Fabrics = std::map<std::filesystem::path, std::unique_ptr<FabricStages>>;

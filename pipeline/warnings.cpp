@@ -168,25 +168,19 @@ void add_light_warnings(const PictureSetup& setup, std::vector<Warning>& warning
     if (light.type != LightType::kSphericalGaussian || !takes_visibility_forms(setup.method)) continue;
     const double sharpness = light.sharpness;
     const std::string name = fmt::format("{} has sharpness {:g}", light_name(l, setup.lights.size()), sharpness);
-    const bool lobes = setup.blend.uses_lobes(light.sharpness);
-    if (lobes && sharpness > kLobesSharpness) {
+    const double lobes_limit = sphere != nullptr ? kSphereLobesSharpness : kLobesSharpness;
+    if (setup.blend.uses_lobes(light.sharpness) && sharpness > lobes_limit) {
       warnings.push_back(
           {"sum-of-gaussians",
            fmt::format("{}, and sums of Gaussians, which leak light from sharpness {:g} on, serve it alone", name,
-                       kLobesSharpness),
-           0.3, "Let signed distances serve it (visibility blend 100 to 200)"});
-    } else if (lobes && sphere != nullptr && sharpness > kSphereLobesSharpness) {
-      warnings.push_back(
-          {"sum-of-gaussians",
-           fmt::format("{}; {} Gaussians over the whole sphere (light_from = \"both\") are coarse from {:g} on", name,
-                       sphere->lobes(), kSphereLobesSharpness),
-           0.3, "More Gaussians (sg_count = 96), light_from = \"face\", or --method path"});
+                       lobes_limit),
+           0.3, "Let signed distances serve it (visibility blend 10 to 20)"});
     }
     if (setup.blend.uses_distance(light.sharpness) && sharpness < kDistanceSharpness) {
       warnings.push_back({"signed-distance",
                           fmt::format("{}, and signed distances, which know one edge only, serve it below {:g}", name,
                                       kDistanceSharpness),
-                          0.4, "Let sums of Gaussians serve it (visibility blend 100 to 200)"});
+                          0.4, "Let sums of Gaussians serve it (visibility blend 10 to 20)"});
     }
     if (setup.method == RenderMethod::kPrinted && sharpness < kPrintedGammaSharpness) {
       warnings.push_back(

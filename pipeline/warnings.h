@@ -39,11 +39,11 @@ std::vector<Warning> warnings_of(const nlohmann::ordered_json& report);
 inline constexpr double kCellMeanFreePaths = 6;
 // Transfer without cones: light that spreads by less than this at every scattering keeps shapes that order 5 cannot hold.
 inline constexpr double kParallelDegrees = 7;
-// Light from both sides: Gaussian lights sharper than this and softer than the signed distance takes over.
-inline constexpr double kSphereLobesSharpness = 20;
-// Sums of Gaussians alone, and signed distances alone: the sharpness beyond which, and below which, each is out of range.
+// Sums of Gaussians alone (on data for light from the face, and from both sides), and signed distances alone: the sharpness beyond
+// which, and below which, each is out of range.
 inline constexpr double kLobesSharpness = 200;
-inline constexpr double kDistanceSharpness = 50;
+inline constexpr double kSphereLobesSharpness = 30;
+inline constexpr double kDistanceSharpness = 3;
 // Gamma as printed: lights softer than this.
 inline constexpr double kPrintedGammaSharpness = 1000;
 // Pixels smaller than this many radii of a fiber show the one value of a segment.

@@ -17,6 +17,14 @@ constexpr int kMaxLobes = 128;
 /// the lobes is itself good to some per cent.
 constexpr float kLeftOut = 3e-3F;
 
+/// A lobe of light whose deviation in azimuth is below this (radians of arc) is looked up once.
+constexpr float kNarrow = 0.1F;
+
+/// Share of a Gaussian of light about a direction at this signed distance from the edge of visibility that comes through.
+float share_within(float distance, float precision) {
+  return 0.5F * (1 + std::erf(std::sqrt(0.5F * precision) * distance));
+}
+
 }  // namespace
 
 Rgb SingleScattering::directional(const ShadingPoint& point, const DirectionPair& light) const {
@@ -75,12 +83,53 @@ Rgb SingleScattering::soft(const ShadingPoint& point, const DirectionPair& axis,
 
 Rgb SingleScattering::sharp(const ShadingPoint& point, const DirectionPair& axis, float sharpness) const {
   assert(ssdf_ != nullptr);
-  const float distance = ssdf_->signed_distance(point.segment, axis.fabric);
-  const float visible = 0.5F * (1 + std::erf(std::sqrt(0.5F * sharpness) * distance));
-  if (!(visible > 0)) return Rgb::Zero();
+  if (ssdf_->sees_nothing[point.segment] != 0) return Rgb::Zero();
   const Mat3 to_fiber = frame_about(point.tangent.world).transpose();
-  return visible / sg_mass(sharpness) *
-         scattered(materials_[point.material], to_fiber * axis.world, sharpness, to_fiber * point.wo.world);
+  const Vec3 light = to_fiber * axis.world;
+  const Vec3 wo = to_fiber * point.wo.world;
+  const BcsdfTable& bcsdf = materials_[point.material];
+  if (gamma_ == SgMethod::kPrinted) {
+    const float distance = ssdf_->signed_distance(point.segment, axis.fabric);
+    return share_within(distance, sharpness) / sg_mass(sharpness) * scattered(bcsdf, light, sharpness, wo);
+  }
+  Rgb sum = Rgb::Zero();
+  for (const BcsdfTable::LobeResponse& lobe : bcsdf.sg_scatter_by_lobe(light, sharpness, wo)) {
+    if (lobe.value.maxCoeff() > 0) sum += lobe.value * visible_share(point, axis.fabric, lobe);
+  }
+  return sum / sg_mass(sharpness);
+}
+
+float SingleScattering::visible_share(const ShadingPoint& point, const Vec3& axis,
+                                      const BcsdfTable::LobeResponse& lobe) const {
+  const Mat3 to_fabric = frame_about(point.tangent.fabric);
+  const Vec3 local = to_fabric.transpose() * axis;
+  const float theta =
+      std::clamp(std::asin(std::clamp(local.x(), -1.0F, 1.0F)) + lobe.theta_shift, -0.5F * kPif, 0.5F * kPif);
+  const float phi = std::atan2(local.z(), local.y()) + lobe.turn;
+  const float cosine = std::cos(theta);
+  const auto distance_at = [&](float turn) {
+    const Vec3 direction(std::sin(theta), cosine * std::cos(phi + turn), cosine * std::sin(phi + turn));
+    return ssdf_->signed_distance(point.segment, to_fabric * direction);
+  };
+  const float centre = distance_at(0);
+  const float deviation = std::min(1 / std::sqrt(lobe.azimuth_precision), kPif / 2);
+  const float width = cosine * deviation;
+  if (width < kNarrow) {
+    const float variance = 0.5F * (1 / lobe.theta_precision + width * width);
+    return share_within(centre, 1 / variance);
+  }
+  // The distance is taken as linear between three azimuths, and looked up at eight between them.
+  using Lanes = Eigen::Array<float, 8, 1>;
+  static const Lanes kDeviations{-1.663F, -0.961F, -0.530F, -0.170F, 0.170F, 0.530F, 0.961F, 1.663F};
+  const float reach = kDeviations[7];
+  const float before = distance_at(-reach * deviation);
+  const float after = distance_at(reach * deviation);
+  float share = 0;
+  for (const float x : kDeviations) {
+    const float distance = centre + std::abs(x) / reach * ((x < 0 ? before : after) - centre);
+    share += share_within(distance, lobe.theta_precision);
+  }
+  return share / static_cast<float>(kDeviations.size());
 }
 
 Rgb SingleScattering::scattered(const BcsdfTable& bcsdf, const Vec3& axis, float sharpness, const Vec3& wo) const {

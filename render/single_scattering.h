@@ -4,10 +4,14 @@
 // (Khungurn 2017, section 5.2). Results are radiance for a light of irradiance 1, before macroscopic shadows.
 //
 // A directional light along w:      V(w) S(w, wo) cos(theta_w), V = 1 where the signed distance to the edge of visibility
-// is > 0. A spherical Gaussian (axis xi, sharpness l, mass M(l)) is blended linearly in l over [100, 200] (VisibilityBlend) between
+// is > 0. A spherical Gaussian (axis xi, sharpness l, mass M(l)) is blended linearly in l over [10, 20] (VisibilityBlend) between
 //   soft:   1 / M(l) sum over lobes q of w_q / M(s) exp(n_q - s - l) Gamma(v_q / n_q, n_q, wo),
 //           v_q = s xi_q + l xi, n_q = |v_q|, s the lobes' sharpness;
-//   sharp:  (1 + erf(sqrt(l / 2) d(xi))) / 2 * Gamma(xi, l, wo) / M(l),  d the signed distance.
+//   sharp:  1 / M(l) sum over the fiber's lobes X = R, TT of Gamma_X(xi, l, wo) U_X,
+//           U_X the share of a Gaussian about the mean of light times lobe that comes through: E[(1 + erf(sqrt(p / 2) d)) / 2], p the
+//           product's precision in inclination, d the signed distance, the mean taken over the product's azimuths.
+// The paper looks d up at xi, with l for p (SgMethod::kPrinted), whatever the fiber takes of that light; a fiber's lobe is
+// much narrower in inclination than a soft light. Errors of both: docs/performance.md.
 //
 // Two spaces. Draped cloth is a bent copy of the flat exemplar: BCSDF and Gamma take world-space unit vectors (angles as
 // they are in the picture), signed distances are looked up in fabric space, where they were baked. The lobes of the soft
@@ -43,13 +47,14 @@ struct ShadingPoint {
 
 /// Which form of visibility serves a spherical Gaussian; a directional light always takes the signed distance.
 struct VisibilityBlend {
-  float from = 100;  // sharpness above which the signed distance takes part
-  float to = 200;    // sharpness from which the lobes no longer do; > from
+  float from = 10;  // sharpness above which the signed distance takes part
+  float to = 20;    // sharpness from which the lobes no longer do; > from
 
   auto operator<=>(const VisibilityBlend&) const = default;
   bool uses_distance(float sharpness) const { return sharpness > from; }
   bool uses_lobes(float sharpness) const { return sharpness < to; }
 };
+inline constexpr VisibilityBlend kPrintedBlend{100, 200};  // for SgMethod::kPrinted, whose signed distances fail earlier
 inline constexpr VisibilityBlend kSignedDistanceOnly{-2, -1};
 inline constexpr VisibilityBlend kLobesOnly{1e30F, 2e30F};
 
@@ -78,6 +83,7 @@ class SingleScattering final : public SingleScatteringModel {
   Rgb scattered(const BcsdfTable& bcsdf, const Vec3& axis, float sharpness, const Vec3& wo) const;
   Rgb soft(const ShadingPoint& point, const DirectionPair& axis, float sharpness) const;
   Rgb sharp(const ShadingPoint& point, const DirectionPair& axis, float sharpness) const;
+  float visible_share(const ShadingPoint& point, const Vec3& axis, const BcsdfTable::LobeResponse& lobe) const;
   const SsdfVisibility* ssdf_;
   const SgVisibility* lobes_;
   std::span<const BcsdfTable> materials_;

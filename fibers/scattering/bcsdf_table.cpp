@@ -100,6 +100,11 @@ struct BcsdfTable::Densities {
   float tt;
 };
 
+struct BcsdfTable::SgSums {
+  std::array<Rgb, 2> value = {Rgb::Zero(), Rgb::Zero()};  // R's and TT's share of Gamma
+  std::array<float, 2> theta_shift = {};                  // mean inclination of what they scatter, from the axis's
+};
+
 float BcsdfTable::LongitudinalLobe::cos2_mean(float cosine, float from_end) const {
   const float uncut = floor + decay * cosine * cosine;
   const float position = std::max(0.0F, from_end) * end_scale;
@@ -247,11 +252,33 @@ BcsdfTable::Sample BcsdfTable::sample(const Vec3& wo, RandomStream& random, cons
 }
 
 Rgb BcsdfTable::sg_scatter(const Vec3& axis, float sharpness, const Vec3& wo) const {
+  const SgSums sums = sg_sums(Inclination(axis), sharpness, Inclination(wo));
+  return sums.value[0] + sums.value[1];
+}
+
+std::array<BcsdfTable::LobeResponse, 2> BcsdfTable::sg_scatter_by_lobe(const Vec3& axis, float sharpness,
+                                                                       const Vec3& wo) const {
+  const Inclination light(axis);
+  const Inclination view(wo);
+  const SgSums sums = sg_sums(light, sharpness, view);
+  std::array<LobeResponse, 2> lobes;
+  for (std::size_t n = 0; n < 2; ++n) {
+    const bool is_r = n == 0;
+    const float cosine = std::max(0.0F, std::cos(light.theta + sums.theta_shift[n]));
+    // Von Mises of light, about its azimuth, times that of TT, about the azimuth opposite to the viewer's.
+    const Vec2 from_light = (sharpness * light.cosine * cosine) * light.azimuth;
+    const Vec2 mean = is_r ? from_light : Vec2(from_light - k_ * view.azimuth);
+    lobes[n] = {sums.value[n], sums.theta_shift[n],
+                std::atan2(light.azimuth.x() * mean.y() - light.azimuth.y() * mean.x(), light.azimuth.dot(mean)),
+                sharpness + (is_r ? r_.inverse_variance : tt_.inverse_variance), mean.norm()};
+  }
+  return lobes;
+}
+
+BcsdfTable::SgSums BcsdfTable::sg_sums(const Inclination& light, float sharpness, const Inclination& view) const {
   constexpr int kLanes = 8;
   constexpr int kMaxNodes = 2 * kBroadNodes;
   using Lanes = Eigen::Array<float, kLanes, 1>;
-  const Inclination light(axis);
-  const Inclination view(wo);
   const float gap = -view.theta - light.theta;  // from theta' to the cone
 
   // Nodes of both lobes, R's first. E is kept relative to the lobe's centre, where angles are small.
@@ -295,7 +322,8 @@ Rgb BcsdfTable::sg_scatter(const Vec3& axis, float sharpness, const Vec3& wo) co
   add_lobe(r_.inverse_variance);
   const int nodes_r = nodes;
   if (!fiber_.isotropic_white) add_lobe(tt_.inverse_variance);
-  if (nodes == 0) return Rgb::Zero();
+  SgSums sums;
+  if (nodes == 0) return sums;
   while (nodes % kLanes != 0) add_node(0.0F, 0.0F, 0.0F, 0.0F);
 
   const float sum2 = (light.azimuth + view.azimuth).squaredNorm();
@@ -304,6 +332,8 @@ Rgb BcsdfTable::sg_scatter(const Vec3& axis, float sharpness, const Vec3& wo) co
   float r = 0.0F;
   float r_schlick = 0.0F;
   float tt = 0.0F;
+  std::array<float, 2> all = {};      // R's and TT's sums
+  std::array<float, 2> shifted = {};  // times theta - theta'
   for (int first = 0; first < nodes; first += kLanes) {
     const Eigen::Map<const Lanes> d_light(&from_light[static_cast<std::size_t>(first)]);
     const Eigen::Map<const Lanes> d_cone(&from_cone[static_cast<std::size_t>(first)]);
@@ -331,19 +361,33 @@ Rgb BcsdfTable::sg_scatter(const Vec3& axis, float sharpness, const Vec3& wo) co
       const float v = weight[static_cast<std::size_t>(n)] * value[lane] * bessel(t[lane]);
       if (fiber_.isotropic_white) {
         r += v * (2.0F / kPif);
+        all[0] += v;
+        shifted[0] += v * d_light[lane];
       } else if (n < nodes_r) {
         const float share = v * r_.norm / r_.cos2_mean(cosine[lane], from_end[lane]);
         r += share;
         r_schlick += share * schlick[lane];
+        all[0] += share;
+        shifted[0] += share * d_light[lane];
       } else {
         const float share = v * tt_.norm / tt_.cos2_mean(cosine[lane], from_end[lane]);
         tt += share * (1.0F - schlick[lane]);
+        all[1] += share;
+        shifted[1] += share * d_light[lane];
       }
     }
   }
-  if (fiber_.isotropic_white) return Rgb::Constant(r);
+  for (std::size_t n = 0; n < 2; ++n) {
+    if (all[n] > 0.0F) sums.theta_shift[n] = shifted[n] / all[n];
+  }
+  if (fiber_.isotropic_white) {
+    sums.value[0] = Rgb::Constant(r);
+    return sums;
+  }
   // azimuth_norm_ is 1 / (2 pi I0e(k)).
-  return color_r_ * r + (1.0F - color_r_) * (r_schlick + tt * (2.0F * kPif * azimuth_norm_) * color_tt_);
+  sums.value = {color_r_ * r + (1.0F - color_r_) * r_schlick,
+                (1.0F - color_r_) * color_tt_ * (tt * (2.0F * kPif * azimuth_norm_))};
+  return sums;
 }
 
 Rgb BcsdfTable::blurred_scatter(const Lanes& theta_i, const Lanes& cos_turn, float theta_o, float variance,

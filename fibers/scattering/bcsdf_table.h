@@ -15,6 +15,7 @@
 // the lobe). Building one takes about 0.1 s. Tested, with the errors and the worst weights, in
 // tests/fibers/scattering/bcsdf_table_test.cpp.
 
+#include <array>
 #include <vector>
 
 #include "fibers/math/random.h"
@@ -48,6 +49,18 @@ class BcsdfTable {
   /// Gamma of sg_scatter.h by SgMethod::kDefault, for a unit axis and sharpness >= 0.
   Rgb sg_scatter(const Vec3& axis, float sharpness, const Vec3& wo) const;
 
+  /// One lobe's share of Gamma, and where that light comes from: about the direction that lies `theta_shift` further in inclination
+  /// and `turn` further in azimuth than the axis, a Gaussian of the given precisions (1 / variance, radians^-2) in both.
+  struct LobeResponse {
+    Rgb value = Rgb::Zero();
+    float theta_shift = 0;
+    float turn = 0;
+    float theta_precision = 0;
+    float azimuth_precision = 0;
+  };
+  /// R's share, then TT's; their values add up to sg_scatter.
+  std::array<LobeResponse, 2> sg_scatter_by_lobe(const Vec3& axis, float sharpness, const Vec3& wo) const;
+
   using Lanes = Eigen::Array<float, 8, 1>;
   using RgbLanes = Eigen::Array<float, 8, 3>;
   /// Scattered towards inclination theta_o from light that is Gaussian in inclination: sum over the lanes of
@@ -77,11 +90,13 @@ class BcsdfTable {
   };
   struct Inclination;
   struct Densities;
+  struct SgSums;
 
   static LongitudinalLobe longitudinal_lobe(double beta);
   float probability_of_r(float theta_o, const Rgb& importance) const;
   Densities densities(const Inclination& in, const Inclination& out) const;
   Rgb value(const Densities& d, const Inclination& in) const;
+  SgSums sg_sums(const Inclination& light, float sharpness, const Inclination& view) const;
   float sampling_density(const Densities& d, const Inclination& out, float probability_of_r) const;
 
   FiberScattering fiber_;

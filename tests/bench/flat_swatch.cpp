@@ -145,7 +145,7 @@ class Swatch {
     }
     if (printed != nullptr) {
       printed_single_.emplace(&*printed->ssdf, printed->sgs ? &*printed->sgs : nullptr, printed->materials,
-                              VisibilityBlend{}, SgMethod::kPrinted);
+                              kPrintedBlend, SgMethod::kPrinted);
       printed_multiple_.emplace(*printed->transfer, printed->materials);
     }
   }

@@ -130,9 +130,9 @@ TEST(Chart, FormsOfVisibilityFollowTheLights) {
   };
   using Labels = std::vector<std::string>;
   EXPECT_EQ(labels({}), Labels{});  // a directional light has one form only
-  EXPECT_EQ(labels(20.0F), (Labels{"signed distance", "blend"}));
-  EXPECT_EQ(labels(150.0F), (Labels{"Gaussians", "signed distance", "blend"}));
-  EXPECT_EQ(labels(500.0F), (Labels{"Gaussians", "blend"}));
+  EXPECT_EQ(labels(10.0F), (Labels{"signed distance", "blend"}));
+  EXPECT_EQ(labels(15.0F), (Labels{"Gaussians", "signed distance", "blend"}));
+  EXPECT_EQ(labels(50.0F), (Labels{"Gaussians", "blend"}));
 }
 
 TEST(Chart, LaddersHoldEverySetting) {
@@ -183,7 +183,7 @@ irradiance = [3, 3, 3]
 [[light]]
 type = "sg"
 axis = [-0.5, 0.4, 1]
-sharpness = 150
+sharpness = 15
 irradiance = [1, 1, 1]
 
 [[cloth]]

@@ -445,7 +445,7 @@ TEST(SurfacesEndToEnd, ThreadsLightsAndCamerasAreEditedWithoutPrecomputingAgain)
   EXPECT_EQ(built("pictures.threads"), Stages{"edited"});
   EXPECT_NE(text_of(shop / "pictures.threads" / "edited.exr"), text_of(shop / "pictures.first" / "edited.exr"));
 
-  scene = edited(edited(scene.c_str(), "fov_deg = 25", "fov_deg = 30").c_str(), "sharpness = 20", "sharpness = 50");
+  scene = edited(edited(scene.c_str(), "fov_deg = 25", "fov_deg = 30").c_str(), "sharpness = 15", "sharpness = 50");
   std::ofstream(shop / "edited.toml") << scene + "surface_method = \"interactive\"\n";
   EXPECT_EQ(built("pictures.lights"), Stages{"edited"});
 
@@ -583,7 +583,7 @@ TEST(PlanEndToEnd, SaysWhatItWouldDoAndBuildsNothing) {
     EXPECT_FALSE(fs::exists(shop / "cache" / stage)) << stage;
   const ProgramResult text = shop.run({"plan", "scene.toml", "--tolerance", "4e-1"});
   EXPECT_NE(text.out.find("choice    exact, signed distance, cells x 2"), std::string::npos) << text.out;
-  EXPECT_NE(text.out.find("light 2   sg, sharpness 20: visibility by signed distances"), std::string::npos) << text.out;
+  EXPECT_NE(text.out.find("light 2   sg, sharpness 15: visibility by signed distances"), std::string::npos) << text.out;
 }
 
 TEST(PlanEndToEnd, TracesPathsWhereNothingElseIsGoodEnough) {

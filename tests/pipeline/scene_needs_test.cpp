@@ -20,10 +20,10 @@ TEST(SceneNeeds, FollowTheLights) {
   EXPECT_FALSE(needs({Light{}}).sgs);
   EXPECT_FALSE(needs({gaussian(0)}).ssdf);
   EXPECT_TRUE(needs({gaussian(0)}).sgs);
-  EXPECT_FALSE(needs({gaussian(100)}).ssdf);  // the blend starts above 100 ...
-  EXPECT_TRUE(needs({gaussian(101)}).ssdf);
-  EXPECT_TRUE(needs({gaussian(199)}).sgs);
-  EXPECT_FALSE(needs({gaussian(200)}).sgs);  // ... and is over at 200
+  EXPECT_FALSE(needs({gaussian(10)}).ssdf);  // the blend starts above 10 ...
+  EXPECT_TRUE(needs({gaussian(11)}).ssdf);
+  EXPECT_TRUE(needs({gaussian(19)}).sgs);
+  EXPECT_FALSE(needs({gaussian(20)}).sgs);  // ... and is over at 20
   EXPECT_TRUE(needs({gaussian(300), gaussian(10)}).sgs);
   EXPECT_TRUE(needs({gaussian(300), gaussian(10)}).ssdf);
 }

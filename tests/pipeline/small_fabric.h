@@ -81,7 +81,7 @@ irradiance = [3, 3, 3]
 [[light]]
 type = "sg"
 axis = [-0.5, 0.4, 1]
-sharpness = 20
+sharpness = 15
 irradiance = [1, 1, 1]
 
 [[cloth]]

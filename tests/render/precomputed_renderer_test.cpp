@@ -359,7 +359,7 @@ TEST(PrecomputedRenderer, SaysWhatThePackLacks) {
     EXPECT_THROW(world->renderer(settings), FileError);
   };
   const Light sharp = directional({0, 0, 1}, 1);
-  const Light soft = gaussian({0, 0, 1}, 20, 1);
+  const Light soft = gaussian({0, 0, 1}, 8, 1);
   FabricPack pack = open_pack(test_cotton());
   pack.ssdf.reset();
   make_world(pack, {soft})->renderer();

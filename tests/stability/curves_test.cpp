@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "pipeline/warnings.h"
 #include "tests/stability/stability_curve.h"
 
 namespace heddle::stability {
@@ -62,12 +63,12 @@ TEST(VisibilityStability, FormsOverTheLightsSharpness) {
   const auto& sum = curve.of("sum of Gaussians");
   const auto& distance = curve.of("signed distance");
   const auto& shipped = curve.of("blended (shipped)");
-  EXPECT_GT(distance[0], 1) << "signed distances under soft light";
+  EXPECT_GT(distance[0], 1.2 * sum[0]) << "signed distances under soft light";
   EXPECT_GT(sum.back(), 2 * distance.back()) << "sums of Gaussians under sharp light";
   for (std::size_t k = 0; k < shipped.size(); ++k) {
     EXPECT_LT(shipped[k], 1.15 * std::min(sum[k], distance[k]))
         << "the blend takes the better form, at " << curve.drivers[k];
-    EXPECT_LT(shipped[k], 0.3);
+    EXPECT_LT(shipped[k], 0.27);
     EXPECT_LT(curve.of("blended, mean")[k], 0.12);
   }
 }
@@ -75,9 +76,9 @@ TEST(VisibilityStability, FormsOverTheLightsSharpness) {
 TEST(VisibilityStability, LightFromBothSides) {
   const Curve curve = measured(sphere_visibility_curve);
   for (std::size_t k = 0; k < curve.drivers.size(); ++k) {
-    EXPECT_LT(curve.of("blended (shipped)")[k], 0.65);
-    EXPECT_LT(curve.of("blended, mean")[k], 0.2);
-    EXPECT_EQ(curve.of("sum of Gaussians")[k] > 0.32, warned(curve, curve.drivers[k])) << curve.drivers[k];
+    EXPECT_LT(curve.of("blended (shipped)")[k], 0.32);
+    EXPECT_LT(curve.of("blended, mean")[k], 0.15);
+    EXPECT_EQ(curve.of("sum of Gaussians")[k] > 0.32, curve.drivers[k] > kSphereLobesSharpness) << curve.drivers[k];
   }
 }
 

@@ -245,6 +245,58 @@ TEST(BcsdfTableAgreement, LightFromSphericalGaussiansAgainstDouble) {
   std::printf("  worst error: %.2f of the tolerance\n", worst);
 }
 
+TEST(BcsdfTableAgreement, LobesOfGammaComeFromWhereQuadratureSays) {
+  FiberScattering fiber;
+  fiber.color_r = Rgbd(.3, .2, .1);
+  fiber.color_tt = Rgbd(.9, .5, .1);
+  fiber.beta_r = radians(5);
+  fiber.beta_tt = radians(9);
+  fiber.gamma_tt = radians(25);
+  const BcsdfTable table(fiber);
+  constexpr int kThetas = 1200;
+  constexpr int kPhis = 720;
+  for (const float sharpness : {20.0F, 120.0F}) {
+    for (const double gap_deg : {0.0, 8.0, -12.0}) {
+      const FiberDirection light = {radians(25), 0.3};
+      const Vec3 axis = vector_from(light).cast<float>();
+      const Vec3 wo = vector_from({radians(-25 + gap_deg), light.phi + 2.6}).cast<float>();
+      const auto lobes = table.sg_scatter_by_lobe(axis, sharpness, wo);
+      EXPECT_LT((lobes[0].value + lobes[1].value - table.sg_scatter(axis, sharpness, wo)).abs().maxCoeff(), 1e-6F);
+      for (std::size_t n = 0; n < 2; ++n) {
+        double total = 0;
+        double theta = 0;
+        double theta2 = 0;
+        double around_cos = 0;
+        double around_sin = 0;
+        for (int i = 0; i < kThetas; ++i) {
+          for (int k = 0; k < kPhis; ++k) {
+            const FiberDirection at = {kPi * ((i + 0.5) / kThetas - 0.5), 2 * kPi * k / kPhis};
+            const Vec3d wi = vector_from(at);
+            const double value = sg_value({axis.cast<double>(), sharpness}, wi) * std::cos(at.theta) * std::cos(at.theta) *
+                                 evaluate_bcsdf(fiber, wi, wo.cast<double>(), n == 0 ? Lobe::kR : Lobe::kTt)[0];
+            total += value;
+            theta += value * (at.theta - light.theta);
+            theta2 += value * (at.theta - light.theta) * (at.theta - light.theta);
+            around_cos += value * std::cos(at.phi - light.phi);
+            around_sin += value * std::sin(at.phi - light.phi);
+          }
+        }
+        const double scale = kPi / kThetas * 2 * kPi / kPhis;
+        const double mean = theta / total;
+        const auto& lobe = lobes[n];
+        // Gamma itself errs by .3 % here; deviations are 5 to 9 degrees, so a hundredth of them is 1e-3.
+        EXPECT_NEAR(lobe.value[0] / (total * scale), 1, 0.01) << sharpness << ' ' << gap_deg << ' ' << n;
+        EXPECT_NEAR(lobe.theta_shift, mean, 2e-3);
+        EXPECT_NEAR(lobe.turn, std::atan2(around_sin, around_cos), 2e-2);
+        EXPECT_NEAR(lobe.theta_precision * (theta2 / total - mean * mean), 1, 0.1);
+        // Of a von Mises distribution, 1 - mean cosine about its centre is 1 / (2 k) + 1 / (8 k^2) for large k.
+        const double k_azimuth = lobe.azimuth_precision;
+        EXPECT_NEAR((1 - std::hypot(around_cos, around_sin) / total) / (0.5 / k_azimuth + 0.125 / (k_azimuth * k_azimuth)), 1, 0.1);
+      }
+    }
+  }
+}
+
 TEST(BcsdfTableAgreement, LightBlurredInInclinationAgainstQuadrature) {
   RandomStream random(9, RandomStage::kTest, 0, 0);
   std::vector<NamedFiber> fibers = fibers_for_tests();
