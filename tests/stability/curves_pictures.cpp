@@ -261,7 +261,10 @@ Curve truncation_curve(Effort effort) {
               .warning_from = kParallelDegrees,
               .warns_above = false};
   const bool full = effort == Effort::kFull;
-  if (full) curve.series.push_back({"shipped, beta_R 15 deg", {}});
+  if (full) {
+    curve.series.push_back({"shipped, beta_R 15 deg", {}});
+    curve.series.push_back({"cones = \"on\"", {}});
+  }
   const std::vector<double> wanders = full ? std::vector<double>{0, 4, 8, 15, 25} : std::vector<double>{0, 25};
   for (std::size_t which = 0; which < curve.series.size(); ++which) {
     for (const double wander : wanders) {
@@ -270,6 +273,7 @@ Curve truncation_curve(Effort effort) {
       fabric.beta_tt_deg = which == 2 ? 15 : 10;
       fabric.wander_deg = wander;
       if (which == 0) fabric.cones = "off";
+      if (which == 3) fabric.cones = "on";
       SmallPipeline pipeline(fabric);
       double square = 0;
       double mean = 0;

@@ -1,12 +1,10 @@
 #include "tests/stability/small_pipeline.h"
 
 #include <fmt/format.h>
-#include <stdlib.h>
 
 #include <cassert>
 #include <cmath>
 #include <fstream>
-#include <stdexcept>
 
 #include "render/render_output.h"
 
@@ -15,12 +13,6 @@ namespace {
 
 std::string list(const Vec3d& v) {
   return fmt::format("[{}, {}, {}]", v.x(), v.y(), v.z());
-}
-
-std::filesystem::path temporary_folder() {
-  std::string name = (std::filesystem::temp_directory_path() / "heddle_stability_XXXXXX").string();
-  if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("cannot create a temporary folder");
-  return name;
 }
 
 }  // namespace
@@ -62,20 +54,13 @@ std::string gaussian(const Vec3d& axis, double sharpness) {
 }
 
 SmallPipeline::SmallPipeline(const SmallFabric& fabric)
-    : folder_(temporary_folder()),
-      console_(messages_, false, true),
-      context_{Cache(folder_ / "cache"), &console_, {}, {}, {}} {
-  std::ofstream(folder_ / "fabric.toml") << fabric.toml();
-}
-
-SmallPipeline::~SmallPipeline() {
-  std::error_code ignored;
-  std::filesystem::remove_all(folder_, ignored);
+    : console_(messages_, false, true), context_{Cache(folder() / "cache"), &console_, {}, {}, {}} {
+  std::ofstream(folder() / "fabric.toml") << fabric.toml();
 }
 
 SceneJob SmallPipeline::job(const SmallScene& scene, const SceneVariant& variant) {
-  std::ofstream(folder_ / "scene.toml") << scene.toml();
-  return SceneJob(folder_ / "scene.toml", context_, variant);
+  std::ofstream(folder() / "scene.toml") << scene.toml();
+  return SceneJob(folder() / "scene.toml", context_, variant);
 }
 
 PictureResult SmallPipeline::picture(const SmallScene& scene, RenderMethod method, int spp, bool local,
@@ -89,7 +74,7 @@ PictureResult SmallPipeline::picture(const SmallScene& scene, RenderMethod metho
 }
 
 FabricPack SmallPipeline::pack(const FabricVariant& variant) {
-  FabricStages stages(folder_ / "fabric.toml", context_, variant);
+  FabricStages stages(folder() / "fabric.toml", context_, variant);
   return load_pack(stages.pack({.ssdf = false, .sgs = false, .transfer = true, .volume = false, .order = {}}).path);
 }
 

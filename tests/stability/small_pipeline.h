@@ -11,6 +11,7 @@
 #include "fibers/math/vector.h"
 #include "formats/image_file.h"
 #include "pipeline/scene_job.h"
+#include "tests/support/temporary_folder.h"
 
 namespace heddle::stability {
 
@@ -59,11 +60,8 @@ std::string gaussian(const Vec3d& axis, double sharpness);
 class SmallPipeline {
  public:
   explicit SmallPipeline(const SmallFabric& fabric = {});
-  ~SmallPipeline();
-  SmallPipeline(const SmallPipeline&) = delete;
-  SmallPipeline& operator=(const SmallPipeline&) = delete;
 
-  std::filesystem::path folder() const { return folder_; }
+  const std::filesystem::path& folder() const { return folder_.path(); }
   SceneJob job(const SmallScene& scene, const SceneVariant& variant = {});
   /// Even spp.
   PictureResult picture(const SmallScene& scene, RenderMethod method, int spp, bool local = true,
@@ -73,7 +71,7 @@ class SmallPipeline {
   std::string messages() const { return messages_.str(); }
 
  private:
-  std::filesystem::path folder_;
+  TemporaryFolder folder_;
   std::ostringstream messages_;
   Console console_;
   StageContext context_;

@@ -2,10 +2,10 @@
 #define HEDDLE_TESTS_SUPPORT_TEMPORARY_FOLDER_H_
 // A folder of its own for one test, removed at the end.
 
-#include <gtest/gtest.h>
 #include <stdlib.h>
 
 #include <filesystem>
+#include <stdexcept>
 #include <string>
 
 namespace heddle {
