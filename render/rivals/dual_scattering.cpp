@@ -15,6 +15,8 @@ constexpr float kMostDeviation = kPif / 2;
 
 // A ray that still carries less than this share is not followed on.
 constexpr float kTooLittle = 1e-5F;
+constexpr float kLeastStep = 1e-3F;  // radii between two surfaces on a ray
+
 
 // cos^2(theta) in f_back, near the tangent: keeps the quotient with cos(theta_d) finite.
 constexpr float kLeastCos2 = 1e-4F;
@@ -145,8 +147,9 @@ DualScattering::Passage DualScattering::passage(const Vec3& position, std::uint3
   while (result.transmittance.maxCoeff() > kTooLittle) {
     const std::optional<FiberHit> hit = tile_->intersect({origin, direction}, own);
     if (!hit) break;
-    origin += hit->t * direction;
     own = exemplar.segment_fiber[hit->segment];
+    // At least a little: where two fibers cross each other's surface, each would be met from the other's for ever.
+    origin += std::max(hit->t, kLeastStep * exemplar.radius_mm[own]) * direction;
     // Where fibers overlap, the ray meets one from inside: it has been counted already.
     const Vec3 tangent = exemplar.segment_tangent(hit->segment);
     Vec3 from_axis = origin - exemplar.segment_midpoint(hit->segment);

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "fibers/math/quadrature.h"
+#include "fibers/math/random.h"
 #include "fibers/math/sampling.h"
 #include "tests/support/small_exemplars.h"
 
@@ -59,6 +60,26 @@ TEST(DualScattering, FibersThatOverlapCountOnceEach) {
   const TileScene tile(exemplar);
   const std::vector<BcsdfTable> materials = {BcsdfTable(test_cotton())};
   EXPECT_EQ(DualScattering(tile, materials).passage({0.1F, 0.5F, 0}, 0, {0, 0, 1}).fibers, 3);
+}
+
+TEST(DualScatteringStability, RaysThroughTheLineWhereTwoSurfacesCrossEnd) {
+  Exemplar exemplar;
+  exemplar.width_mm = exemplar.height_mm = 1;
+  exemplar.scattering = {test_cotton()};
+  add_straight_fiber(exemplar, {0, 0.5F, 0}, true, 0.02F);
+  add_straight_fiber(exemplar, {0, 0.495F, 0.1F}, true, 0.02F);
+  add_straight_fiber(exemplar, {0, 0.505F, 0.1F}, true, 0.02F);
+  index_segments(exemplar);
+  const TileScene tile(exemplar);
+  const std::vector<BcsdfTable> materials = {BcsdfTable(test_cotton())};
+  const DualScattering dual(tile, materials);
+  const Vec3 crossing(0.3F, 0.5F, 0.1F + std::sqrt(0.02F * 0.02F - 0.005F * 0.005F));
+  for (int k = 0; k < 20000; ++k) {
+    RandomStream random(3, RandomStage::kTest, 0, static_cast<std::uint64_t>(k));
+    const Vec3 towards = crossing + 1e-6F * Vec3(0, random.uniform() - 0.5F, 0);
+    const Vec3 start = crossing - Vec3(0.2F * (random.uniform() - 0.5F), 0.02F * (random.uniform() - 0.5F), 0.1F);
+    ASSERT_LE(dual.passage(start, 0, (towards - start).normalized()).fibers, 2) << k;
+  }
 }
 
 TEST(DualScattering, UncoveredFiberScattersOnceExactly) {
