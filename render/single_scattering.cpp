@@ -92,24 +92,25 @@ Rgb SingleScattering::sharp(const ShadingPoint& point, const DirectionPair& axis
     const float distance = ssdf_->signed_distance(point.segment, axis.fabric);
     return share_within(distance, sharpness) / sg_mass(sharpness) * scattered(bcsdf, light, sharpness, wo);
   }
+  const Mat3 to_fabric = frame_about(point.tangent.fabric);
+  const Vec3 local = to_fabric.transpose() * axis.fabric;
+  const float theta = std::asin(std::clamp(local.x(), -1.0F, 1.0F));
+  const float phi = std::atan2(local.z(), local.y());
   Rgb sum = Rgb::Zero();
   for (const BcsdfTable::LobeResponse& lobe : bcsdf.sg_scatter_by_lobe(light, sharpness, wo)) {
-    if (lobe.value.maxCoeff() > 0) sum += lobe.value * visible_share(point, axis.fabric, lobe);
+    if (lobe.value.maxCoeff() > 0) sum += lobe.value * visible_share(point.segment, to_fabric, theta, phi, lobe);
   }
   return sum / sg_mass(sharpness);
 }
 
-float SingleScattering::visible_share(const ShadingPoint& point, const Vec3& axis,
+float SingleScattering::visible_share(std::uint32_t segment, const Mat3& to_fabric, float axis_theta, float axis_phi,
                                       const BcsdfTable::LobeResponse& lobe) const {
-  const Mat3 to_fabric = frame_about(point.tangent.fabric);
-  const Vec3 local = to_fabric.transpose() * axis;
-  const float theta =
-      std::clamp(std::asin(std::clamp(local.x(), -1.0F, 1.0F)) + lobe.theta_shift, -0.5F * kPif, 0.5F * kPif);
-  const float phi = std::atan2(local.z(), local.y()) + lobe.turn;
+  const float theta = std::clamp(axis_theta + lobe.theta_shift, -0.5F * kPif, 0.5F * kPif);
+  const float phi = axis_phi + lobe.turn;
   const float cosine = std::cos(theta);
   const auto distance_at = [&](float turn) {
     const Vec3 direction(std::sin(theta), cosine * std::cos(phi + turn), cosine * std::sin(phi + turn));
-    return ssdf_->signed_distance(point.segment, to_fabric * direction);
+    return ssdf_->signed_distance(segment, to_fabric * direction);
   };
   const float centre = distance_at(0);
   const float deviation = std::min(1 / std::sqrt(lobe.azimuth_precision), kPif / 2);

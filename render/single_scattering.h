@@ -83,7 +83,9 @@ class SingleScattering final : public SingleScatteringModel {
   Rgb scattered(const BcsdfTable& bcsdf, const Vec3& axis, float sharpness, const Vec3& wo) const;
   Rgb soft(const ShadingPoint& point, const DirectionPair& axis, float sharpness) const;
   Rgb sharp(const ShadingPoint& point, const DirectionPair& axis, float sharpness) const;
-  float visible_share(const ShadingPoint& point, const Vec3& axis, const BcsdfTable::LobeResponse& lobe) const;
+  /// Share of a lobe's light that comes through. to_fabric: from the fiber's frame; axis_theta, axis_phi: the light's axis there.
+  float visible_share(std::uint32_t segment, const Mat3& to_fabric, float axis_theta, float axis_phi,
+                      const BcsdfTable::LobeResponse& lobe) const;
   const SsdfVisibility* ssdf_;
   const SgVisibility* lobes_;
   std::span<const BcsdfTable> materials_;
