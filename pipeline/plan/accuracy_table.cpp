@@ -13,22 +13,30 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr int kFormatVersion = 1;
+constexpr int kFormatVersion = 2;
 
-/// Between which two values of an increasing list, and how far on the way, in logarithms; values below 1e-3 count as that.
+/// Between which two values of an increasing list, and how far on the way.
 struct Place {
   std::size_t low = 0;
   std::size_t high = 0;
   double share = 0;
+
+  double weight(bool of_high) const { return of_high ? share : 1 - share; }
 };
-Place place_of(const std::vector<double>& values, double value) {
-  const auto logarithm = [](double v) { return std::log(std::max(v, 1e-3)); };
+/// On a scale of its own.
+template <class Scale>
+Place place_of(const std::vector<double>& values, double value, Scale&& scale) {
   if (value <= values.front()) return {0, 0, 0};
   if (value >= values.back()) return {values.size() - 1, values.size() - 1, 0};
   const auto above = std::upper_bound(values.begin(), values.end(), value);
   const auto high = static_cast<std::size_t>(above - values.begin());
-  const double low = logarithm(values[high - 1]);
-  return {high - 1, high, (logarithm(value) - low) / (logarithm(values[high]) - low)};
+  const double low = scale(values[high - 1]);
+  return {high - 1, high, (scale(value) - low) / (scale(values[high]) - low)};
+}
+
+/// Values below 1e-3 count as that.
+double logarithm(double value) {
+  return std::log(std::max(value, 1e-3));
 }
 
 const Accuracy kNothing{0, 0, 0, Rgbd::Zero()};
@@ -73,24 +81,26 @@ const SettingAccuracy& AccuracyTable::setting(const std::string& name) const {
   return *found;
 }
 
-Accuracy AccuracyTable::at(const std::string& name, double light_sharpness, double footprint) const {
+Accuracy AccuracyTable::at(const std::string& name, double light_sharpness, double footprint, double cosine) const {
   const SettingAccuracy& of = setting(name);
-  const Place light = place_of(sharpness, light_sharpness);
-  const Place pixel = place_of(footprint_mm, footprint);
+  const Place light = place_of(sharpness, light_sharpness, logarithm);
+  const Place pixel = place_of(footprint_mm, footprint, logarithm);
+  const Place height = place_of(light_cosine, cosine, [](double value) { return value; });
   Accuracy result = kNothing;
-  const auto add = [&](std::size_t l, std::size_t f, double weight) {
-    add_weighted(of.entries[l * footprint_mm.size() + f], weight, result);
-  };
-  add(light.low, pixel.low, (1 - light.share) * (1 - pixel.share));
-  add(light.low, pixel.high, (1 - light.share) * pixel.share);
-  add(light.high, pixel.low, light.share * (1 - pixel.share));
-  add(light.high, pixel.high, light.share * pixel.share);
+  for (unsigned corner = 0; corner < 8; ++corner) {
+    const bool high[] = {(corner & 1U) != 0, (corner & 2U) != 0, (corner & 4U) != 0};
+    const std::size_t l = high[0] ? light.high : light.low;
+    const std::size_t f = high[1] ? pixel.high : pixel.low;
+    const std::size_t h = high[2] ? height.high : height.low;
+    add_weighted(of.entries[(l * footprint_mm.size() + f) * light_cosine.size() + h],
+                 light.weight(high[0]) * pixel.weight(high[1]) * height.weight(high[2]), result);
+  }
   return result;
 }
 
 Accuracy AccuracyTable::at_bent(const std::string& name, double light_sharpness) const {
   const SettingAccuracy& of = setting(name);
-  const Place light = place_of(sharpness, light_sharpness);
+  const Place light = place_of(sharpness, light_sharpness, logarithm);
   Accuracy result = kNothing;
   add_weighted(of.bent[light.low], 1 - light.share, result);
   add_weighted(of.bent[light.high], light.share, result);
@@ -105,7 +115,11 @@ Json accuracy_json(const AccuracyTable& table) {
                {"threads", table.threads},
                {"sharpness", table.sharpness},
                {"footprint_mm", table.footprint_mm},
-               {"bent_footprint_mm", table.bent_footprint_mm}};
+               {"light_cosine", table.light_cosine},
+               {"bent_footprint_mm", table.bent_footprint_mm},
+               {"bent_light_cosine", table.bent_light_cosine},
+               {"color", {table.color[0], table.color[1], table.color[2]}},
+               {"through", table.through}};
   json["settings"] = Json::array();
   for (const SettingAccuracy& setting : table.settings) {
     json["settings"].push_back({{"name", setting.name},
@@ -139,14 +153,20 @@ AccuracyTable read_accuracy(const std::filesystem::path& path) {
     table.threads = json.at("threads").get<int>();
     table.sharpness = json.at("sharpness").get<std::vector<double>>();
     table.footprint_mm = json.at("footprint_mm").get<std::vector<double>>();
+    table.light_cosine = json.at("light_cosine").get<std::vector<double>>();
     table.bent_footprint_mm = json.at("bent_footprint_mm").get<double>();
-    const std::size_t count = table.sharpness.size() * table.footprint_mm.size();
+    table.bent_light_cosine = json.at("bent_light_cosine").get<double>();
+    const auto color = json.at("color").get<std::array<double, 3>>();
+    table.color = Rgbd(color[0], color[1], color[2]);
+    table.through = json.at("through").get<double>();
+    const std::size_t count = table.sharpness.size() * table.footprint_mm.size() * table.light_cosine.size();
     const auto increases = [](const std::vector<double>& values) {
       return !values.empty() && values.front() >= 0 &&
              std::adjacent_find(values.begin(), values.end(), std::greater_equal<>()) == values.end();
     };
-    if (!increases(table.sharpness) || !increases(table.footprint_mm) || table.threads < 1) {
-      throw FileError(path.string() + ": an accuracy table without increasing sharpnesses and footprints");
+    if (!increases(table.sharpness) || !increases(table.footprint_mm) || !increases(table.light_cosine) ||
+        table.threads < 1) {
+      throw FileError(path.string() + ": an accuracy table without increasing sharpnesses, footprints and cosines");
     }
     for (const Json& entry : json.at("settings")) {
       SettingAccuracy setting;
@@ -182,12 +202,21 @@ std::string accuracy_text(const AccuracyTable& table) {
         text += fmt::format("{:>12}", fmt::format("{:.1f} ({:.0f})", 100 * std::sqrt(std::max(0.0, entry.bias_square)),
                                                   100 * std::sqrt(std::max(0.0, entry.noise_square))));
       };
-      for (std::size_t f = 0; f < table.footprint_mm.size(); ++f)
-        add(setting.entries[l * table.footprint_mm.size() + f]);
-      add(setting.bent[l]);
-      text += l == 0 ? fmt::format("{:>15.3g}\n", 1e6 * setting.seconds_per_sample) : "\n";
+      const std::size_t heights = table.light_cosine.size();
+      for (std::size_t h = heights; h-- > 0;) {
+        if (h + 1 < heights) text += fmt::format("{:<22} {:>12} ", "", "low light");
+        for (std::size_t f = 0; f < table.footprint_mm.size(); ++f)
+          add(setting.entries[(l * table.footprint_mm.size() + f) * heights + h]);
+        if (h + 1 < heights) {
+          text += "\n";
+          continue;
+        }
+        add(setting.bent[l]);
+        text += l == 0 ? fmt::format("{:>15.3g}\n", 1e6 * setting.seconds_per_sample) : "\n";
+      }
     }
   }
+  text += fmt::format("lit from behind: {:.2f} of what it shows lit from its face\n", table.through);
   for (const auto& [part, cost] : table.costs) {
     text += fmt::format("to build {:<26} {:.3g} s ({} threads)\n", part, cost.seconds, table.threads);
   }

@@ -22,7 +22,7 @@ inline constexpr double kDirectionalSharpness = 1e5;
 /// One setting under one light, at one footprint. Squares are relative to the squared mean radiance.
 struct Accuracy {
   double bias_square = 0;        // mean square of (setting - path tracing), noise taken out; may be slightly negative
-  double bias_square_error = 0;  // one standard error
+  double bias_square_error = 0;  // one standard error, for another pair of view and light
   double noise_square = 0;       // variance of one sample of a pixel
   Rgbd color_ratio = Rgbd::Ones();
 };
@@ -32,7 +32,7 @@ struct SettingAccuracy {
   std::string name;
   double seconds_per_sample = 0;
   double setup_seconds = 0;       // per picture
-  std::vector<Accuracy> entries;  // [light][footprint], flat
+  std::vector<Accuracy> entries;  // [light][footprint][height of the light], flat
   std::vector<Accuracy> bent;     // [light], a folded swatch in pixels of bent_footprint_mm
 };
 
@@ -42,16 +42,23 @@ struct AccuracyTable {
   int threads = 0;                   // that the times were measured with
   std::vector<double> sharpness;     // [light] increasing
   std::vector<double> footprint_mm;  // [footprint] edge of a pixel on the cloth, increasing
+  std::vector<double> light_cosine;  // [height of the light] to the normal of the flat cloth, increasing
   double bent_footprint_mm = 0;
+  double bent_light_cosine = 0;
+  Rgbd color = Rgbd::Ones();  // of the flat cloth, relative to the mean of the channels
+  // Radiance of the flat cloth lit from behind, relative to that under the same light from its face; 0 of surfaces, which are alike on both sides.
+  double through = 0;
   std::vector<SettingAccuracy> settings;  // "path" first
   std::map<std::string, WorkTime> costs;  // of building, by part: "maps", "transfer, cells x 2", ...
 
   bool has(const std::string& setting) const;
   const SettingAccuracy& setting(const std::string& name) const;
-  /// Bilinear in the logarithms of sharpness and footprint; the nearest entry beyond the ends.
-  Accuracy at(const std::string& setting, double sharpness, double footprint_mm) const;
+  /// Linear in the logarithms of sharpness and footprint, and in the cosine; the nearest entry beyond the ends.
+  Accuracy at(const std::string& setting, double sharpness, double footprint_mm, double light_cosine) const;
   /// The same of the folded swatch.
   Accuracy at_bent(const std::string& setting, double sharpness) const;
+  /// Squared error of the mean colour, part of bias_square: relative to the squared mean radiance.
+  double mean_square(const Rgbd& color_ratio) const { return (color * (color_ratio - 1)).square().mean(); }
 };
 
 nlohmann::ordered_json accuracy_json(const AccuracyTable& table);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <span>
 #include <utility>
 
 #include "fibers/tracing/tile_scene.h"
@@ -30,7 +31,12 @@ struct ViewAndLight {
   double view_theta, view_phi;
   double light_theta, light_phi;
 };
-constexpr ViewAndLight kPairs[] = {{10, 20, 35, 80}, {40, 200, 20, 330}, {55, 110, 50, 250}, {30, 290, 60, 300}};
+// Errors depend on how low the light stands more than on the view: as many pairs of low light as of high.
+constexpr std::size_t kHeights = 2;
+constexpr std::size_t kPairsOfHeight = 4;
+constexpr ViewAndLight kPairs[kHeights * kPairsOfHeight] = {
+    {30, 290, 60, 300}, {20, 340, 58, 130}, {70, 260, 65, 80}, {45, 90, 62, 200},    // low light
+    {10, 20, 35, 80},   {40, 200, 20, 330}, {65, 150, 30, 20}, {50, 110, 40, 250}};  // high
 
 // Folds: a sine wave along x, slopes up to 35 degrees, unrolled without stretch. Of the size that drapes have; in steeper ones (50
 // degrees) the light from slope to slope is more than it is on the drape of configs/meshes.
@@ -46,6 +52,17 @@ Vec3d direction_of(double theta_deg, double phi_deg) {
   return {std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta)};
 }
 
+double mean_cosine(std::span<const ViewAndLight> pairs) {
+  double sum = 0;
+  for (const ViewAndLight& pair : pairs) sum += std::cos(radians(pair.light_theta));
+  return sum / static_cast<double>(pairs.size());
+}
+
+ViewAndLight from_behind(ViewAndLight pair) {
+  pair.light_theta = 180 - pair.light_theta;
+  return pair;
+}
+
 Light light_of(double sharpness, const ViewAndLight& pair) {
   Light light;
   light.type = sharpness >= kDirectionalSharpness ? LightType::kDirectional : LightType::kSphericalGaussian;
@@ -54,7 +71,7 @@ Light light_of(double sharpness, const ViewAndLight& pair) {
   return light;
 }
 
-/// Sums over the pixels of one footprint's pictures.
+/// Sums over the pixels of a picture, at one footprint.
 struct Sums {
   double bias = 0;          // of d0 d1
   double bias_squares = 0;  // of (d0 d1)^2
@@ -62,15 +79,6 @@ struct Sums {
   double count = 0;         // pixels
   Rgbd picture = Rgbd::Zero();
   Rgbd reference = Rgbd::Zero();
-
-  void add(const Sums& other) {
-    bias += other.bias;
-    bias_squares += other.bias_squares;
-    variance += other.variance;
-    count += other.count;
-    picture += other.picture;
-    reference += other.reference;
-  }
 };
 
 /// The halves of a picture, averaged over squares of pixels step by step.
@@ -247,7 +255,11 @@ class TableMaker {
       : swatch_(&swatch), progress_(&progress), steps_(settings) {
     table_.threads = working_threads();
     for (const double sharpness : kSharpnesses) table_.sharpness.push_back(sharpness);
+    for (std::size_t height = 0; height < kHeights; ++height) {
+      table_.light_cosine.push_back(mean_cosine(std::span(kPairs).subspan(height * kPairsOfHeight, kPairsOfHeight)));
+    }
     table_.bent_footprint_mm = kBentSeen / swatch.effort().bent_pixels;
+    table_.bent_light_cosine = mean_cosine(kBentPairs);
     for (int level = 0; level < kLevels; ++level) table_.footprint_mm.push_back(std::ldexp(swatch.pixel_mm(), level));
   }
 
@@ -271,17 +283,21 @@ class TableMaker {
     };
     std::size_t picture = 0;
     for (const double sharpness : kSharpnesses) {
-      std::vector<Sums> levels(kLevels);
+      std::vector<std::vector<Sums>> levels(kLevels);  // [level][pair]
       for (std::size_t pair = 0; pair < std::size(kPairs); ++pair) {
         const std::vector<Sums> sums =
             compare_with(picture++, swatch_->camera(pair), light_of(sharpness, kPairs[pair]), false, kLevels);
-        for (std::size_t level = 0; level < kLevels; ++level) levels[level].add(sums[level]);
+        for (std::size_t level = 0; level < kLevels; ++level) levels[level].push_back(sums[level]);
       }
-      for (const Sums& sums : levels) setting.entries.push_back(accuracy_of(sums));
-      Sums bent;
+      for (const std::vector<Sums>& of_pairs : levels) {
+        for (std::size_t height = 0; height < kHeights; ++height) {
+          setting.entries.push_back(accuracy_of(std::span(of_pairs).subspan(height * kPairsOfHeight, kPairsOfHeight)));
+        }
+      }
+      std::vector<Sums> bent;
       for (std::size_t pair = 0; pair < std::size(kBentPairs); ++pair, ++picture) {
         const Camera camera = Swatch::bent_camera(pair, swatch_->effort().bent_pixels);
-        bent.add(compare_with(picture, camera, light_of(sharpness, kBentPairs[pair]), true, 1)[0]);
+        bent.push_back(compare_with(picture, camera, light_of(sharpness, kBentPairs[pair]), true, 1)[0]);
       }
       setting.bent.push_back(accuracy_of(bent));
     }
@@ -291,17 +307,56 @@ class TableMaker {
     ++done_;
   }
 
+  /// Colour of the cloth, and what shines through it: directional light from the face, and from behind. After the reference.
+  void add_through(const Shoot& shoot) {
+    Rgbd front = Rgbd::Zero();
+    Rgbd behind = Rgbd::Zero();
+    const std::size_t first = reference_.size() - std::size(kPairs) - std::size(kBentPairs);
+    for (std::size_t pair = 0; pair < std::size(kPairs); ++pair) {
+      const Light light = light_of(kDirectionalSharpness, from_behind(kPairs[pair]));
+      front += sum_of(reference_[first + pair]);
+      behind += sum_of(shoot(swatch_->camera(pair), {light}, false).frame);
+    }
+    if (!(front.mean() > 0)) return;  // black cloth
+    table_.color = front / front.mean();
+    table_.through = behind.mean() / front.mean();
+  }
+
   AccuracyTable take() { return std::move(table_); }
 
  private:
   static constexpr double kShots =
       static_cast<double>(std::size(kSharpnesses) * (std::size(kPairs) + std::size(kBentPairs)));
 
-  static Accuracy accuracy_of(const Sums& sums) {
-    const double mean = sums.reference.mean() / sums.count;
-    const double scale = 1 / (sums.count * mean * mean);
-    const double spread = std::max(0.0, sums.bias_squares - sums.bias * sums.bias / sums.count);
-    return {sums.bias * scale, std::sqrt(spread) * scale, sums.variance * scale, sums.picture / sums.reference};
+  static Rgbd sum_of(const FrameBuffers& frame) {
+    Rgbd sum = Rgbd::Zero();
+    for (const Rgb& value : frame.beauty) sum += value.cast<double>();
+    return sum;
+  }
+
+  /// Mean over pairs of view and light of what is relative to each one's own mean radiance: a scene shows one or few of them. What
+  /// another pair may show differs from the mean by as much as these do from each other.
+  static Accuracy accuracy_of(std::span<const Sums> pairs) {
+    const auto n = static_cast<double>(pairs.size());
+    Accuracy result{0, 0, 0, Rgbd::Zero()};
+    Rgbd picture = Rgbd::Zero();
+    Rgbd reference = Rgbd::Zero();
+    double squares = 0;
+    double noise = 0;
+    for (const Sums& sums : pairs) {
+      const double mean = sums.reference.mean() / sums.count;
+      const double scale = mean > 0 ? 1 / (sums.count * mean * mean) : 0;
+      result.bias_square += sums.bias * scale / n;
+      result.noise_square += sums.variance * scale / n;
+      squares += sums.bias * scale * sums.bias * scale / n;
+      noise += scale * scale * std::max(0.0, sums.bias_squares - sums.bias * sums.bias / sums.count);
+      picture += sums.picture;
+      reference += sums.reference;
+    }
+    const double spread = std::max(0.0, squares - result.bias_square * result.bias_square) * n / (n - 1);
+    result.bias_square_error = std::sqrt(std::max(spread * (1 + 1 / n), noise / (n * n)));
+    result.color_ratio = (reference > 0).select(picture / reference, 1.0);
+    return result;
   }
 
   const Swatch* swatch_;
@@ -407,6 +462,7 @@ AccuracyTable measure_accuracy(AccuracyData& data, std::uint64_t seed, const Acc
     return precomputed(swatch, pack, settings);
   };
   maker.add("path", paths(swatch, effort.path_samples, 0));
+  maker.add_through(paths(swatch, effort.path_samples, 0));
   maker.add("path-6", paths(swatch, effort.method_samples, 6));
   maker.add("dual-scattering", with([](auto& settings) { settings.shading = LocalShading::kDualScattering; }));
   maker.add("exact", precomputed(swatch, pack, usual));

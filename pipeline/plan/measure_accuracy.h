@@ -3,11 +3,12 @@
 // Fills an accuracy table: every setting against path tracing on a flat swatch of the fabric, and on one that lies in folds over
 // black, by the renderers' own code.
 //
-// Four pairs of view and light, five sharpnesses; each a picture of 64 x 64 pixels as wide as a fiber. Errors of wider pixels
+// Eight pairs of view and light, four of them with low light, five sharpnesses; each a picture of 32 x 32 pixels as wide as a fiber. Errors of wider pixels
 // come from the same pictures: differences, averaged over squares of pixels, before they are squared. Path tracing and method
-// share their eye rays (probe.h). Squares of the four pairs are added before they are divided by the squared mean radiance, as in
-// a picture that shows all four. Folds bring light that grazes, shadows that end, and light from one slope to the next: two pairs,
-// pixels of 6 mm (errors of folds are wide, and noise averages), many samples each.
+// share their eye rays (probe.h). Squares are relative to the squared mean radiance of their own pair, and pairs of one height
+// of the light are averaged; their spread is the error. Folds bring light that grazes, shadows that end, and light from one slope to the next: two pairs,
+// pixels of 6 mm (errors of folds are wide, and noise averages), many samples each. The flat swatch is path-traced once more under
+// directional light from behind.
 // Settings, all else as the fabric says:
 //   path, path-6, dual-scattering             nothing baked
 //   exact, volume                             everything
@@ -54,11 +55,11 @@ Transfer cut_to_order(const Transfer& transfer, int order);
 
 /// How much is measured; less is for tests.
 struct AccuracyEffort {
-  int pixels = 64;        // along an edge of a flat picture, a power of two of at least 32
+  int pixels = 32;        // along an edge of a flat picture, a power of two of at least 32
   int bent_pixels = 8;    // of a folded one
-  int path_samples = 16;  // per pixel, flat; `bent_factor` times as many in folds; even
-  int method_samples = 4;
-  int bent_factor = 64;
+  int path_samples = 32;  // per pixel, flat; `bent_factor` times as many in folds; even
+  int method_samples = 8;
+  int bent_factor = 32;
 };
 
 /// Called with the share done, 0 .. 1; may throw to stop.

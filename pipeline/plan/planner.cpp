@@ -9,17 +9,31 @@ namespace {
 
 // Standard errors added to what a candidate is thought to err by. More would turn away fast methods whose error is near the
 // tolerance, at a high price; less would miss it.
-constexpr double kCaution = 0.7;
+constexpr double kCaution = 0.25;
 // Share of the squared tolerance that is aimed at: the noise of a picture is itself uncertain.
 constexpr double kAim = 0.92;
 
-double cautious(const Estimate& square) {
-  return std::max(0.0, square.value) + kCaution * square.error;
+// Standard errors less at best: finding out more costs little beside what it may save.
+constexpr double kHope = 0.7;
+// More caution of the bias is taken as long as noise keeps this share of its room: that many more samples at most.
+constexpr double kMoreCaution = 1;
+constexpr double kRoomKept = 0.88;
+
+// What is known may cost so much more than what is not.
+constexpr double kLittleMore = 1.25;
+// Of a pilot of few of the picture's pixels, relative: a few pixels hold most of the squares, and it misses more of them than it meets.
+constexpr double kPilotError = 0.4;
+
+double cautious(const Estimate& square, double caution = kCaution) {
+  return std::max(0.0, square.value) + caution * square.error;
 }
 
 /// Squared error that noise may have.
 double room(const Candidate& candidate, double tolerance) {
-  return kAim * tolerance * tolerance - cautious(candidate.bias_square);
+  const auto left = [&](double caution) {
+    return kAim * tolerance * tolerance - cautious(candidate.bias_square, caution);
+  };
+  return std::max(left(kMoreCaution), kRoomKept * left(kCaution));
 }
 
 /// Samples in the candidate's steps; one step more than kMostSamples where those are not enough.
@@ -68,13 +82,43 @@ std::optional<std::size_t> cheapest(std::span<const Candidate> candidates, doubl
   return best;
 }
 
+std::optional<std::size_t> cheapest_known(std::span<const Candidate> candidates, const std::vector<bool>& known,
+                                          double tolerance, int pictures) {
+  const std::optional<std::size_t> any = cheapest(candidates, tolerance, pictures);
+  if (!any) return {};
+  std::size_t best = *any;
+  double seconds = kLittleMore * offer(candidates[best], tolerance, pictures)->seconds;
+  for (std::size_t k = 0; k < candidates.size(); ++k) {
+    const std::optional<Offer> made = known[k] ? offer(candidates[k], tolerance, pictures) : std::nullopt;
+    if (!made || made->seconds > seconds) continue;
+    best = k;
+    seconds = made->seconds;
+  }
+  return best;
+}
+
 double best_tolerance(std::span<const Candidate> candidates) {
   double best = std::numeric_limits<double>::infinity();
   for (const Candidate& candidate : candidates) {
-    const double square = cautious(candidate.bias_square) + cautious(candidate.noise_square) / kMostSamples;
+    const double noise = cautious(candidate.noise_square) / kMostSamples;
+    const double square = std::min(cautious(candidate.bias_square, kMoreCaution) + noise,
+                                   cautious(candidate.bias_square) + noise / kRoomKept);
     best = std::min(best, std::sqrt(square / kAim));
   }
   return best;
+}
+
+Estimate at_best(const Estimate& square) {
+  return {std::max(0.0, square.value - kHope * square.error), 0};
+}
+
+Estimate weighed(Estimate thought, Estimate measured, double unseen) {
+  // No square is negative: what is below 0 is noise, however little of it the pilot thinks that it has.
+  measured.error = std::max(measured.error, -measured.value);
+  const double square = std::max(thought.value, measured.value - measured.error);
+  thought.error = std::max(thought.error, kTableError * square);
+  measured.error = std::hypot(measured.error, kPilotError * std::sqrt(unseen) * square);
+  return combined(thought, measured);
 }
 
 Estimate combined(const Estimate& a, const Estimate& b) {

@@ -11,6 +11,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "pipeline/plan/probe.h"
 
@@ -50,11 +51,25 @@ int more_samples(const Candidate& candidate, const Estimate& noise_square, int d
 /// The cheapest of those that meet the tolerance; nothing where none does.
 std::optional<std::size_t> cheapest(std::span<const Candidate> candidates, double tolerance, int pictures);
 
+/// The same, but one of those that are known (by a pilot of their own) where it costs little more: finding out costs, too.
+std::optional<std::size_t> cheapest_known(std::span<const Candidate> candidates, const std::vector<bool>& known,
+                                          double tolerance, int pictures);
+
 /// The smallest tolerance that some candidate meets.
 double best_tolerance(std::span<const Candidate> candidates);
 
+/// A squared error with caution on the other side: what it may well be, at best.
+Estimate at_best(const Estimate& square);
+
 /// Two independent estimates of one quantity.
 Estimate combined(const Estimate& a, const Estimate& b);
+
+/// How far the squared error on a swatch is from that of a scene, relative, one standard error (docs/plan.md).
+inline constexpr double kTableError = 0.5;
+
+/// What a way is thought to err by and what a pilot of it measured, both squared; `unseen` is the share of the picture's pixels that
+/// the pilot left out. Both are wrong by a share of what the error is, not of what they say it is: else the lower would count for more.
+Estimate weighed(Estimate thought, Estimate measured, double unseen);
 
 }  // namespace heddle
 

@@ -21,16 +21,18 @@ namespace fs = std::filesystem;
 constexpr int kBlockEdge = 8;
 // Of the first pilot; less of a small picture.
 constexpr int kFirstPixels = 1024;
-constexpr int kPilotSamples = 4;
+constexpr int kPilotSamples = 2;
 // A pilot of the chosen way may take this share of its pictures' time if its noise is not known well enough before.
 constexpr double kPilotShare = 0.08;
 constexpr double kNoiseKnown = 0.08;  // relative standard error
-// Cheapest ways tried before the plan settles for what is known.
-constexpr int kMostTries = 8;
-// How far an error on the flat swatch is from that of a scene, relative, one standard error (docs/plan.md).
-constexpr double kTableError = 0.5;
-// The same of a pilot's few pixels.
-constexpr double kPilotError = 0.4;
+// Pilots, of paths or of ways, before the plan settles for what is known.
+constexpr int kMostTries = 16;
+// A way is tried where that takes at most this share of the time of what it offers.
+constexpr double kTryShare = 0.2;
+// Where a way would take at most this share of the time of the one that is sure to be good enough, it is worth finding out more of it.
+constexpr double kHope = 0.5;
+// Building its data and trying it may take this share of what it may save.
+constexpr double kBuildShare = 0.25;
 // Light from one cloth to another is known well enough if its squared error is this share of the squared tolerance, or less.
 constexpr double kBetweenKnown = 0.05;
 // The pilot's random numbers are not those of the picture.
@@ -46,6 +48,7 @@ struct Fabric {
   fs::path file;
   std::string name;
   int order = 5;  // its own
+  bool light_from_both_sides = false;
   std::optional<AccuracyTable> table;
   // Stages with the data of a variant. The fabric's own always exist.
   std::map<FabricVariant, std::unique_ptr<FabricStages>> stages;
@@ -54,6 +57,18 @@ struct Fabric {
 struct LightShare {
   double sharpness;
   double weight;  // of all the light that a cloth receives
+  double cosine;  // to the cloth's normal, mean over what is seen
+};
+
+/// Light on one pixel's cloth, by the side it falls on; in the units of the lights.
+struct PixelLight {
+  struct OnSide {
+    double seen = 0;    // on the side that the pixel sees
+    double across = 0;  // on the other
+    double shown(double through) const { return seen + through * across; }
+  };
+  OnSide face;
+  OnSide back;
 };
 
 class ScenePlanner {
@@ -73,9 +88,9 @@ class ScenePlanner {
     const Stopwatch watch;
     const int first = static_cast<int>(std::clamp(pixels_ / 4, 256.0, static_cast<double>(kFirstPixels)));
     trace_pilot(first, kPilotSamples);
+    find_fabrics();
     look_at_cloths();
     add_path();
-    find_fabrics();
     // Surface models are lit the same way by all methods.
     if (!fabrics_.empty() && read_tables()) add_other_ways();
     settle();
@@ -136,17 +151,22 @@ class ScenePlanner {
     local.local = true;
     local_paths_ = shoot(*job_, local).frames;
     light_between_ = relative(squared_bias_of_means(local_paths_, paths_));
+    light_between_mean_ = mean_.value > 0 ? mean_radiance(local_paths_) / mean_.value - 1 : 0;
   }
   static bool lacks_light_between(const Way& way) {
     return !traces_paths(way.method) || !way.variant.stand_ins.empty();
   }
 
-  /// The error of a way from that against what it claims to compute, and what it does not claim.
+  /// The error of a way: from that against what it claims to compute and from what it does not claim; and as its own pilot saw it.
   void add_up(Way& way) const {
-    way.candidate.bias_square = way.bias_square;
-    if (!lacks_light_between(way)) return;
-    way.candidate.bias_square.value += std::max(0.0, light_between_.value);
-    way.candidate.bias_square.error = std::hypot(way.candidate.bias_square.error, light_between_.error);
+    Estimate thought = way.bias_square;
+    if (lacks_light_between(way)) {
+      // Where both darken, they add up.
+      const double together = 2 * std::max(0.0, way.mean_error * light_between_mean_);
+      thought.value += std::max(0.0, light_between_.value) + together;
+      thought.error = std::hypot(thought.error, light_between_.error);
+    }
+    way.candidate.bias_square = way.pilot ? weighed(thought, way.pilot->bias_square, way.pilot->unseen) : thought;
   }
 
   /// An absolute square relative to the mean radiance; the mean's own error counts.
@@ -162,6 +182,7 @@ class ScenePlanner {
     const SceneConfig& scene = plan_.scene;
     plan_.seen.resize(scene.cloths.size());
     lights_of_cloth_.resize(scene.cloths.size());
+    pixel_lights_.resize(scene.cloths.size());
     lights_ = fit_environments(scene.lights).lights;
     std::vector<std::size_t> cloth_of_fibers;
     for (std::size_t k = 0; k < scene.cloths.size(); ++k) {
@@ -184,8 +205,17 @@ class ScenePlanner {
         seen.share += 1;
         seen.light_share += light;
         seen.footprint_mm += std::log(ray.spread * hit->t);
+        PixelLight& on_pixel = pixel_lights_[cloth].emplace_back();
+        const bool sees_face = fibers.fabric_direction(*hit, -ray.direction).z() > 0;
         for (std::size_t l = 0; l < lights_.size(); ++l) {
-          facing[cloth][l] += std::max(0.0, static_cast<double>(fibers.fabric_direction(*hit, lights_[l].axis).z()));
+          const double height = static_cast<double>(fibers.fabric_direction(*hit, lights_[l].axis).z());
+          facing[cloth][l] += std::max(0.0, height);
+          const bool on_face = height > 0;
+          const Shell::SurfacePoint lit = fibers.surface_point(*hit, on_face ? ClothSide::kFace : ClothSide::kBack);
+          if (!fibers.globally_visible(lit, lights_[l].axis)) continue;
+          PixelLight::OnSide& side = on_face ? on_pixel.face : on_pixel.back;
+          (on_face == sees_face ? side.seen : side.across) +=
+              static_cast<double>(lights_[l].irradiance.mean()) * std::abs(height);
         }
       }
     }
@@ -200,7 +230,7 @@ class ScenePlanner {
             static_cast<double>(lights_[l].irradiance.mean()) * std::max(0.05, facing[cloth][l] / seen.share);
         const double sharpness =
             lights_[l].is_directional() ? kDirectionalSharpness : static_cast<double>(lights_[l].sharpness);
-        lights_of_cloth_[cloth].push_back({sharpness, weight});
+        lights_of_cloth_[cloth].push_back({sharpness, weight, facing[cloth][l] / seen.share});
         all += weight;
       }
       for (LightShare& light : lights_of_cloth_[cloth]) light.weight = all > 0 ? light.weight / all : 0;
@@ -223,6 +253,7 @@ class ScenePlanner {
       const auto own = std::make_unique<FabricStages>(cloth.fabric, *context_);
       fabric->name = own->document().config.name;
       fabric->order = own->document().transfer.order;
+      fabric->light_from_both_sides = own->document().config.light_from_both_sides;
       fabrics_.push_back(std::move(fabric));
     }
   }
@@ -393,50 +424,82 @@ class ScenePlanner {
     return settings;
   }
 
+  /// An error in two parts: that of the mean colour, of which several add up, and the rest, whose squares do. What folds do to the
+  /// mean is kept apart: it does not make good where else a setting is too bright.
+  struct Parts {
+    Rgbd flat_ratio;
+    Rgbd folds_ratio;
+    double rest_square;
+    void change(const Parts& to, const Parts& from, bool in_folds) {
+      (in_folds ? folds_ratio : flat_ratio) *= to.flat_ratio / from.flat_ratio.max(1e-3);
+      rest_square += to.rest_square - from.rest_square;
+    }
+  };
+  static Parts parts_of(const AccuracyTable& table, const Accuracy& entry) {
+    return {entry.color_ratio, Rgbd::Ones(), entry.bias_square - table.mean_square(entry.color_ratio)};
+  }
+
   /// What a table says of one cloth: squares relative to the cloth's own light, noise and time relative to path tracing.
   struct OfCloth {
     Estimate bias_square;
+    double mean_error = 0;
     double noise_ratio = 1;
     double time_ratio = 1;
     double setup_seconds = 0;
   };
   OfCloth ask(const AccuracyTable& table, const Settings& settings, std::size_t cloth) const {
     const double footprint = plan_.seen[cloth].footprint_mm;
-    double together = 0;  // of biases, if they are the same everywhere
-    double apart = 0;     // of their squares, if they have nothing to do with each other
+    Rgbd flat_error = Rgbd::Zero();   // of the mean
+    Rgbd folds_error = Rgbd::Zero();  // what folds add to it
+    double together = 0;              // of errors apart from the mean's, if they are the same everywhere
+    double apart = 0;                 // of their squares, if they have nothing to do with each other
     double error = 0;
     double noise = 0;
     double path_noise = 0;
     for (const LightShare& light : lights_of_cloth_[cloth]) {
-      const auto at = [&](const std::string& setting) { return table.at(setting, light.sharpness, footprint); };
+      const auto at = [&](const std::string& setting) {
+        return table.at(setting, light.sharpness, footprint, light.cosine);
+      };
+      const auto folded = [&](const std::string& setting) { return table.at_bent(setting, light.sharpness); };
+      const double weight = light.weight * light.weight;
       const Accuracy base = at(settings.base);
       const bool is_bent = plan_.scene.cloths[cloth].mesh.has_value();
-      const auto folded = [&](const std::string& setting) { return table.at_bent(setting, light.sharpness); };
-      double square = base.bias_square;
+      Parts parts = parts_of(table, base);
+      double unsure = base.bias_square_error;
       for (const auto& [setting, of] : settings.changes) {
-        const double change = at(setting).bias_square - at(of).bias_square;
+        const Accuracy flat[] = {at(setting), at(of)};
+        const Accuracy bent[] = {folded(setting), folded(of)};
         // Where light grazes, a setting may matter more.
-        const double in_folds = folded(setting).bias_square - folded(of).bias_square;
-        square += is_bent ? std::max(change, in_folds) : change;
+        const bool more_in_folds =
+            is_bent && bent[0].bias_square - bent[1].bias_square > flat[0].bias_square - flat[1].bias_square;
+        const Accuracy* of_cloth = more_in_folds ? bent : flat;
+        unsure = std::max(unsure, of_cloth->bias_square_error);
+        parts.change(parts_of(table, of_cloth[0]), parts_of(table, of_cloth[1]), more_in_folds);
       }
-      square = std::max(0.0, square);
       // What folds add to a flat swatch seen from as far.
       if (is_bent) {
-        const double flat = table.at(settings.base, light.sharpness, table.bent_footprint_mm).bias_square;
+        const Accuracy flat =
+            table.at(settings.base, light.sharpness, table.bent_footprint_mm, table.bent_light_cosine);
         const Accuracy bent = folded(settings.base);
-        square += std::max(0.0, bent.bias_square - std::max(0.0, flat));
-        error += light.weight * light.weight * bent.bias_square_error;
+        if (bent.bias_square > flat.bias_square) parts.change(parts_of(table, bent), parts_of(table, flat), true);
+        // Other folds show other pairs of view and light, but many of them.
+        unsure = bent.bias_square_error;
       }
-      const double weight = light.weight * light.weight;
+      const double square = std::max(0.0, parts.rest_square);
+      flat_error += light.weight * (parts.flat_ratio - 1);
+      folds_error += light.weight * (parts.folds_ratio - 1);
       together += light.weight * std::sqrt(square);
       apart += weight * square;
-      error += weight * base.bias_square_error;
+      error += weight * unsure;
       noise += weight * base.noise_square;
       path_noise += weight * at("path").noise_square;
     }
     OfCloth result;
-    const double square = 0.5 * (together * together + apart);
+    const double of_mean = table.mean_square(1 + flat_error) + table.mean_square(1 + folds_error) +
+                           2 * (table.color.square() * (flat_error * folds_error).max(0)).mean();
+    const double square = of_mean + 0.5 * (together * together + apart);
     result.bias_square = {square, std::hypot(error, kTableError * square)};
+    result.mean_error = (table.color * (flat_error + folds_error)).mean();
     if (path_noise > 0) result.noise_ratio = noise / path_noise;
     double seconds = table.setting(settings.base).seconds_per_sample;
     for (const auto& [setting, of] : settings.changes) {
@@ -445,6 +508,24 @@ class ScenePlanner {
     result.time_ratio = seconds / table.setting("path").seconds_per_sample;
     result.setup_seconds = table.setting(settings.base).setup_seconds;
     return result;
+  }
+
+  /// Adds what a cloth shows of light on its back, which data of light from the face do not hold.
+  void add_light_from_behind(std::size_t cloth, double through, OfCloth& answer) const {
+    double all = 0;
+    double missing = 0;
+    double squares = 0;
+    for (const PixelLight& light : pixel_lights_[cloth]) {
+      const double behind = light.back.shown(through);
+      all += light.face.shown(through) + behind;
+      missing += behind;
+      squares += behind * behind;
+    }
+    if (!(missing > 0)) return;
+    const double square = squares * static_cast<double>(pixel_lights_[cloth].size()) / (all * all);
+    answer.bias_square.value += square;
+    answer.bias_square.error = std::hypot(answer.bias_square.error, kTableError * square);
+    answer.mean_error -= missing / all;
   }
 
   void add_way(RenderMethod method, const SceneVariant& variant) {
@@ -469,11 +550,15 @@ class ScenePlanner {
       if (variant.stand_ins.contains(k)) {
         answer = ask(surfaces_.at(surface_key(cloth)), {surface_setting(cloth.far_surface->name), {}}, k);
       } else {
-        answer = ask(*fabric_of(cloth.fabric)->table, settings_of(method, variant, variant.of(cloth.fabric)), k);
+        const Fabric& fabric = *fabric_of(cloth.fabric);
+        answer = ask(*fabric.table, settings_of(method, variant, variant.of(cloth.fabric)), k);
+        const bool precomputed = method == RenderMethod::kExact || method == RenderMethod::kVolume;
+        if (precomputed && !fabric.light_from_both_sides) add_light_from_behind(k, fabric.table->through, answer);
       }
       // The cloth's light, squared, relative to the picture's: (light_share / share)^2, on `share` of the pixels.
       const double weight = of.light_share * of.light_share / of.share;
       way.bias_square.value += weight * answer.bias_square.value;
+      way.mean_error += of.light_share * answer.mean_error;
       way.bias_square.error += weight * answer.bias_square.error;
       noise += weight * answer.noise_ratio;
       noise_weight += weight;
@@ -560,15 +645,22 @@ class ScenePlanner {
     return list;
   }
 
+  std::vector<bool> tried() const {
+    std::vector<bool> list;
+    for (const Way& way : plan_.ways) list.push_back(way.tried);
+    return list;
+  }
+
   void settle() {
     const double tolerance = plan_.question.tolerance;
     const int pictures = plan_.question.pictures;
     for (int tries = 0; tries < kMostTries; ++tries) {
-      plan_.chosen = cheapest(candidates(), tolerance, pictures);
+      plan_.chosen = cheapest_known(candidates(), tried(), tolerance, pictures);
       if (!plan_.chosen) break;
-      if (!learn(plan_.ways[*plan_.chosen], *offer(plan_.ways[*plan_.chosen].candidate, tolerance, pictures))) break;
+      const Offer offered = *offer(plan_.ways[*plan_.chosen].candidate, tolerance, pictures);
+      if (!hope(offered) && !learn(plan_.ways[*plan_.chosen], offered)) break;
     }
-    plan_.chosen = cheapest(candidates(), tolerance, pictures);
+    plan_.chosen = cheapest_known(candidates(), tried(), tolerance, pictures);
     if (!plan_.chosen) return;
     const Way& way = plan_.ways[*plan_.chosen];
     plan_.offer = offer(way.candidate, tolerance, pictures);
@@ -585,34 +677,79 @@ class ScenePlanner {
     path.seconds_per_spp = path_seconds_per_spp_;
   }
 
+  /// Finds out more of a way that may be much cheaper than what is offered, if it errs by less than caution allows for; false where
+  /// there is none, or finding out takes too long.
+  bool hope(const Offer& offered) {
+    std::vector<Candidate> list = candidates();
+    for (Candidate& candidate : list) candidate.bias_square = at_best(candidate.bias_square);
+    const std::optional<std::size_t> best = cheapest(list, plan_.question.tolerance, plan_.question.pictures);
+    if (!best || *best == *plan_.chosen) return false;
+    const Offer hoped = *offer(list[*best], plan_.question.tolerance, plan_.question.pictures);
+    if (hoped.seconds > kHope * offered.seconds) return false;
+    Way& way = plan_.ways[*best];
+    if (!way.pilot || way.pilot->samples < pilot_samples()) {
+      const double affordable = kBuildShare * (offered.seconds - hoped.seconds);
+      if (way.candidate.build_seconds + seconds_to_try(way) > affordable || !may_try(way)) return false;
+      try_out(way);
+      return true;
+    }
+    return more_paths(kPilotShare * offered.seconds);
+  }
+
   /// Finds out more of the way that looks cheapest; false where there is nothing to find out.
   bool learn(Way& way, const Offer& offered) {
     if (way.family == "path") {
-      const double planned = pixels_ * offered.spp * plan_.question.pictures;
+      // A picture finds out itself how many samples it needs: only the choice depends on its noise here.
       const double error = way.candidate.noise_square.error / way.candidate.noise_square.value;
-      const double done = pilot_pixels_ * path_spp_;
-      // Four times the samples, twice as sure; no more than the share.
-      const double wanted = std::min(kPilotShare * planned, 16 * done);
-      if (error < kNoiseKnown || wanted < 2 * done) return false;
-      trace_pilot_of(wanted);
-      return true;
+      return error >= kNoiseKnown && has_rival(offered) && more_paths(kPilotShare * offered.seconds);
     }
     if (lacks_light_between(way) && know_light_between(offered)) return true;
-    if (way.tried) return false;
-    if (way.candidate.build_seconds > 0 && !plan_.question.may_build) return false;
+    if (way.tried || !may_try(way) || seconds_to_try(way) > kTryShare * offered.seconds) return false;
     try_out(way);
     return true;
+  }
+
+  /// Does another way not cost much more?
+  bool has_rival(const Offer& offered) const {
+    for (std::size_t k = 0; k < plan_.ways.size(); ++k) {
+      const std::optional<Offer> other =
+          offer(plan_.ways[k].candidate, plan_.question.tolerance, plan_.question.pictures);
+      if (k != *plan_.chosen && other && kHope * other->seconds < offered.seconds) return true;
+    }
+    return false;
+  }
+
+  double pilot_samples() const { return pilot_pixels_ * path_spp_; }
+  double seconds_per_path() const { return path_seconds_per_spp_ / pixels_; }
+
+  /// A larger pilot of paths in the seconds affordable; false where it would not be much larger. Four times the samples are twice as sure.
+  bool more_paths(double affordable) {
+    const double wanted = std::min(affordable / seconds_per_path(), 4 * pilot_samples());
+    if (wanted < 2 * pilot_samples()) return false;
+    trace_pilot_of(wanted);
+    return true;
+  }
+
+  bool may_try(const Way& way) const { return plan_.question.may_build || !(way.candidate.build_seconds > 0); }
+  /// Samples per pixel of a pilot to be compared with that of paths: as many as tell most of the difference in the time of both.
+  int samples_to_try(const Way& way) const {
+    const Candidate& path = plan_.ways[0].candidate;
+    const double noise = way.candidate.noise_square.value / path.noise_square.value;
+    const double time = way.candidate.seconds_per_spp / path.seconds_per_spp;
+    const double samples = path_spp_ * std::sqrt(noise / time);
+    return 2 * std::clamp(static_cast<int>(std::lround(samples / 2)), kPilotSamples / 2, path_spp_ / 2);
+  }
+  /// Building apart.
+  double seconds_to_try(const Way& way) const {
+    return way.candidate.setup_seconds + samples_to_try(way) * pilot_pixels_ / pixels_ * way.candidate.seconds_per_spp;
   }
 
   /// Another pilot, if light between cloths decides what is offered and is not known; false if not.
   bool know_light_between(const Offer& offered) {
     const double tolerance = plan_.question.tolerance;
-    const double done = pilot_pixels_ * path_spp_;
+    if (light_between_.error < kBetweenKnown * tolerance * tolerance) return false;
     // Both pictures of paths count.
-    const double affordable = kPilotShare * offered.seconds / (2 * path_seconds_per_spp_ / pixels_);
-    const double wanted = std::min(affordable, 16 * done);
-    if (light_between_.error < kBetweenKnown * tolerance * tolerance || wanted < 2 * done) return false;
-    trace_pilot_of(wanted);
+    if (!more_paths(kPilotShare * offered.seconds / 2)) return false;
     trace_local();
     for (Way& way : plan_.ways) add_up(way);
     return true;
@@ -629,28 +766,26 @@ class ScenePlanner {
       }
     }
     SceneJob& job = way.variant == SceneVariant{} ? *job_ : *other_job_;
-    const SceneJob::Crops crops = shoot(job, pilot_request(way.method, kPilotSamples));
+    const int samples = samples_to_try(way);
+    const SceneJob::Crops crops = shoot(job, pilot_request(way.method, samples));
     const Candidate before = way.candidate;
     Candidate& now = way.candidate;
     now.noise_square = relative(sample_variance(crops.frames));
-    now.seconds_per_spp = seconds_per_spp(crops, kPilotSamples);
+    now.seconds_per_spp = seconds_per_spp(crops, samples);
     now.setup_seconds = crops.setup.seconds;
     now.build_seconds = 0;  // by now it is there
-    trace_local();
-    const bool claims_all = !lacks_light_between(way) || local_paths_.empty();
-    Estimate measured = relative(squared_bias(crops.frames, claims_all ? paths_ : local_paths_));
-    // A few pixels hold most of the squares, and a pilot misses more of them than it meets: it may raise what the table says, not
-    // lower it.
-    measured.error = std::max(measured.error, kPilotError * std::abs(measured.value));
-    const Estimate of_table = way.bias_square;
-    const Estimate both = combined(of_table, measured);
-    if (of_table.error > 0 && both.value > of_table.value) way.bias_square = both;
-    add_up(way);
+    Estimate measured = relative(squared_bias(crops.frames, paths_));
+    // The spread between few blocks misses rare bright paths; the noise of two halves is at least this.
+    const double noise =
+        2 * (plan_.ways[0].candidate.noise_square.value / path_spp_ + now.noise_square.value / samples);
+    measured.error = std::max(measured.error, noise / std::sqrt(pilot_pixels_));
+    way.pilot = {measured, pilot_samples(), std::max(0.0, 1 - pilot_pixels_ / pixels_)};
     way.tried = true;
+    add_up(way);
     // What differs from the table here does so for the like of it too.
     const double noise_ratio = now.noise_square.value / before.noise_square.value;
     const double time_ratio = now.seconds_per_spp / before.seconds_per_spp;
-    const double more_bias = way.bias_square.value - of_table.value;
+    const double more_bias = now.bias_square.value - before.bias_square.value;
     for (Way& other : plan_.ways) {
       if (other.tried || other.family != way.family) continue;
       Candidate& like = other.candidate;
@@ -673,6 +808,7 @@ class ScenePlanner {
   WorkTime loading_;                                      // and building
   std::vector<Light> lights_;                             // environments as Gaussians
   std::vector<std::vector<LightShare>> lights_of_cloth_;  // [cloth][light]
+  std::vector<std::vector<PixelLight>> pixel_lights_;     // [cloth][pixel of the first pilot on it]
   std::vector<std::unique_ptr<Fabric>> fabrics_;
   std::map<std::pair<fs::path, std::string>, AccuracyTable> surfaces_;
 
@@ -680,6 +816,7 @@ class ScenePlanner {
   std::vector<FrameBuffers> paths_;        // [block]
   std::vector<FrameBuffers> local_paths_;  // [block] the same, local; empty until asked for, or where all are
   Estimate light_between_;                 // squared, of what is not local
+  double light_between_mean_ = 0;          // of the picture's mean without it
   double pilot_pixels_ = 0;
   int path_spp_ = 0;
   double path_setup_ = 0;

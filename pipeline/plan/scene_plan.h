@@ -45,9 +45,17 @@ struct Way {
       family;  // "path", "path-6", "dual-scattering", "exact", "volume"; with "+ surfaces" where some cloth is one
   RenderMethod method = RenderMethod::kPath;
   SceneVariant variant;
-  Estimate bias_square;  // against what the method claims to compute: the candidate's without the light between cloths
+  Estimate bias_square;   // against what the method claims to compute: the candidate's without the light between cloths
+  double mean_error = 0;  // of the picture's mean radiance, relative, as the tables have it; part of bias_square
   Candidate candidate;
   bool tried = false;  // its noise and speed are this view's own, by a pilot
+  /// What the pilot said of its error, against paths that miss nothing.
+  struct Pilot {
+    Estimate bias_square;
+    double samples;  // of paths
+    double unseen;   // share of the picture's pixels
+  };
+  std::optional<Pilot> pilot = {};
 };
 
 /// What the pilot saw of one cloth of the scene.

@@ -114,7 +114,9 @@ DualScattering::Averages DualScattering::averages(std::uint16_t index, float the
   const float variance_tt = material.beta_tt * material.beta_tt;
   const auto mean_variance = [&](const Rgb& r, const Rgb& t) -> Rgb {
     const Rgb sum = r + t;
-    return (sum > 0).select((variance_r * r + variance_tt * t) / sum.max(1e-30F), variance_r);
+    // Near the tangent plane a channel without colour reflects next to nothing; quotients of such numbers are no mean.
+    constexpr float kNothing = 1e-30F;
+    return (sum > kNothing).select((variance_r * r + variance_tt * t) / sum.max(kNothing), variance_r);
   };
   return {half_r + forward_tt, half_r + backward_tt, mean_variance(half_r, forward_tt),
           mean_variance(half_r, backward_tt)};

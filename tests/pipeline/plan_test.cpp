@@ -63,6 +63,31 @@ TEST(Plan, WhatIsNotKnownCostsSamples) {
   EXPECT_GT(offer(unsure, 0.2, 1)->spp, offer(sure, 0.2, 1)->spp);
 }
 
+TEST(Plan, MoreCautionWhereItCostsLittle) {
+  // Two standard errors are room enough beside a bias far below the tolerance, and would leave none beside one near it.
+  const auto samples_more = [](double bias_square) {
+    Candidate unsure = kCandidates[1];
+    unsure.bias_square = {bias_square, 0};
+    const int sure = offer(unsure, 0.2, 1)->spp;
+    unsure.bias_square.error = 0.5 * bias_square;
+    return static_cast<double>(offer(unsure, 0.2, 1)->spp) / sure;
+  };
+  EXPECT_GT(samples_more(0.1 * 0.04), 1 + 0.9 * 0.5 * 0.1 / (0.92 - 0.1)) << "a whole standard error, or nearly";
+  EXPECT_GT(samples_more(0.6 * 0.04), 1.1);
+  Candidate near = kCandidates[1];
+  near.bias_square = {0.8 * 0.04, 0.3 * 0.04};
+  EXPECT_TRUE(offer(near, 0.2, 1)) << "not turned away for what it may be at worst";
+  near.bias_square.value = 0.9 * 0.04;
+  EXPECT_FALSE(offer(near, 0.2, 1));
+}
+
+TEST(Plan, AtBestIsBelowWhatIsThought) {
+  EXPECT_LT(at_best({1, 0.5}).value, 1);
+  EXPECT_EQ(at_best({1, 0}).value, 1);
+  EXPECT_EQ(at_best({0.1, 5}).value, 0) << "no square is negative";
+  EXPECT_EQ(at_best({1, 0.5}).error, 0) << "no caution on top";
+}
+
 TEST(Plan, PicturesGoOnUntilTheirOwnNoiseIsSmallEnough) {
   for (const Candidate& of : kCandidates) {
     const double tolerance = 0.4;
@@ -95,6 +120,20 @@ TEST(Plan, CheapestThatIsGoodEnough) {
   EXPECT_EQ(name_at(0.15, 1), "fast");
   EXPECT_EQ(name_at(0.4, 100), "fast");  // what it costs to build is shared
   EXPECT_EQ(name_at(0.09, 1), "path");   // no other is near enough
+}
+
+TEST(Plan, WhatIsKnownIsPreferredToWhatCostsLittleLess) {
+  const std::vector<Candidate> list = {candidate("path", 0, 4, 0, 0.05, 2), candidate("known", 0.1, 1, 0, 0.011),
+                                       candidate("unknown", 0.1, 1, 0, 0.01),
+                                       candidate("far cheaper", 0.1, 1, 0, 0.003)};
+  const auto chosen = [&](std::size_t count, const std::vector<bool>& known) {
+    return cheapest_known(std::span(list).first(count), known, 0.15, 1).value();
+  };
+  EXPECT_EQ(chosen(3, {true, true, false}), 1U);
+  EXPECT_EQ(chosen(3, {true, false, false}), 2U) << "paths are known, and cost much more";
+  EXPECT_EQ(chosen(3, {true, true, true}), 2U);
+  EXPECT_EQ(chosen(4, {true, true, true, false}), 3U);
+  EXPECT_FALSE(cheapest_known(list, {true, true, true, true}, 1e-6, 1));
 }
 
 TEST(Plan, TighterTolerancesNeverGetCheaper) {
@@ -130,6 +169,28 @@ TEST(Plan, EstimatesCountByWhatIsKnownOfThem) {
   EXPECT_NEAR(both.value, (1 * 4 + 3 * 1) / 5.0, 1e-12);
   EXPECT_NEAR(both.error, std::sqrt(0.01 * 0.8), 1e-12);
   EXPECT_EQ(combined({1, 0}, {3, 0.2}).value, 1);
+}
+
+TEST(Plan, PilotsRaiseAndLowerWhatTablesSay) {
+  const Estimate table = {0.1, 0.05};
+  // Of all pixels and without noise, a pilot knows.
+  EXPECT_NEAR(weighed(table, {0.04, 1e-6}, 0).value, 0.04, 1e-6);
+  EXPECT_NEAR(weighed(table, {0.3, 1e-6}, 0).value, 0.3, 1e-6);
+  // All noise, it says nothing.
+  EXPECT_NEAR(weighed(table, {-3, 50}, 0).value, 0.1, 1e-4);
+  EXPECT_NEAR(weighed(table, {3, 50}, 0).value, 0.1, 1e-4);
+  // A negative square is noise: it lowers what is thought, but does not make nothing of it.
+  EXPECT_GT(weighed(table, {-0.2, 0.02}, 0).value, 0.07);
+  EXPECT_LT(weighed(table, {-0.2, 0.02}, 0).value, 0.1);
+  // Of few pixels, it counts for about as much as the table, whichever of the two is the lower.
+  const Estimate lowered = weighed(table, {0.05, 0.001}, 1);
+  const Estimate raised = weighed({0.05, 0.025}, {0.1, 0.001}, 1);
+  EXPECT_GT(lowered.value, 0.055);
+  EXPECT_LT(lowered.value, 0.08);
+  EXPECT_GT(raised.value, 0.07);
+  EXPECT_LT(raised.value, 0.095);
+  // The more it saw, the more it counts.
+  EXPECT_LT(weighed(table, {0.05, 0.001}, 0.2).value, lowered.value);
 }
 
 TEST(Probe, BlocksLieInsideAndApart) {
@@ -275,22 +336,32 @@ AccuracyTable small_table() {
   table.threads = 2;
   table.sharpness = {10, 1000};
   table.footprint_mm = {0.1, 0.4};
+  table.light_cosine = {0.5, 0.9};
   const auto entry = [](double bias) { return Accuracy{bias, 0.01, 2 * bias, Rgbd(1, 0.9, 1.1)}; };
   table.bent_footprint_mm = 3;
-  table.settings = {{"path", 1e-5, 0.5, {entry(0), entry(0), entry(0), entry(0)}, {entry(0), entry(0)}},
-                    {"exact", 1e-6, 0.25, {entry(1), entry(2), entry(3), entry(4)}, {entry(5), entry(7)}}};
+  table.bent_light_cosine = 0.7;
+  table.color = Rgbd(1.5, 1, 0.5);
+  table.through = 0.25;
+  // [light][footprint][height]: low light errs by 10 more.
+  table.settings = {{"path", 1e-5, 0.5, std::vector<Accuracy>(8, entry(0)), {entry(0), entry(0)}},
+                    {"exact",
+                     1e-6,
+                     0.25,
+                     {entry(11), entry(1), entry(12), entry(2), entry(13), entry(3), entry(14), entry(4)},
+                     {entry(5), entry(7)}}};
   table.costs = {{"maps", {1.5, 3.0}}, {"transfer, cells x 2", {2.5, 5.0}}};
   return table;
 }
 
 TEST(AccuracyTable, BetweenEntriesInLogarithms) {
   const AccuracyTable table = small_table();
-  EXPECT_DOUBLE_EQ(table.at("exact", 10, 0.1).bias_square, 1);
-  EXPECT_NEAR(table.at("exact", 10, 0.2).bias_square, 1.5, 1e-12);
-  EXPECT_NEAR(table.at("exact", 100, 0.2).bias_square, 2.5, 1e-12);
-  EXPECT_DOUBLE_EQ(table.at("exact", 0, 0.001).bias_square, 1) << "the nearest entry beyond the ends";
-  EXPECT_DOUBLE_EQ(table.at("exact", kDirectionalSharpness, 10).bias_square, 4);
-  EXPECT_THROW(table.at("no such", 10, 0.1), FileError);
+  EXPECT_DOUBLE_EQ(table.at("exact", 10, 0.1, 0.9).bias_square, 1);
+  EXPECT_NEAR(table.at("exact", 10, 0.2, 0.9).bias_square, 1.5, 1e-12);
+  EXPECT_NEAR(table.at("exact", 100, 0.2, 0.9).bias_square, 2.5, 1e-12);
+  EXPECT_NEAR(table.at("exact", 100, 0.2, 0.6).bias_square, 10, 1e-12) << "cosines themselves, not their logarithms";
+  EXPECT_DOUBLE_EQ(table.at("exact", 0, 0.001, 1).bias_square, 1) << "the nearest entry beyond the ends";
+  EXPECT_DOUBLE_EQ(table.at("exact", kDirectionalSharpness, 10, 0).bias_square, 14);
+  EXPECT_THROW(table.at("no such", 10, 0.1, 0.5), FileError);
 }
 
 TEST(AccuracyTableFormat, RoundTrip) {
@@ -313,7 +384,7 @@ TEST(AccuracyTableFormat, DamagedTablesAreRefused) {
     std::ofstream(path, std::ios::trunc) << whole.substr(0, size);
     EXPECT_THROW(read_accuracy(path), FileError) << size;
   }
-  for (const auto& [from, to] : {std::pair<std::string, std::string>{"\"version\": 1", "\"version\": 99"},
+  for (const auto& [from, to] : {std::pair<std::string, std::string>{"\"version\": 2", "\"version\": 99"},
                                  {"heddle accuracy", "heddle chart"},
                                  {"1000.0", "10.0"},
                                  {"\"threads\": 2", "\"threads\": \"2\""}}) {
@@ -379,10 +450,16 @@ TEST(MeasureAccuracyStatistical, SaysWhatHoldsOfAnyFabric) {
     EXPECT_NEAR(table.footprint_mm[f], 2 * table.footprint_mm[f - 1], 1e-9);
   }
   EXPECT_NEAR(table.footprint_mm[0], 0.02, 1e-5) << "the fibers' diameter";
+  EXPECT_NEAR(table.color.mean(), 1, 1e-9);
+  EXPECT_GT(table.through, 0.01) << "thin cloth lets light through";
+  EXPECT_LT(table.through, 2);
+  ASSERT_EQ(table.light_cosine.size(), 2U);
+  EXPECT_LT(table.light_cosine[0], 0.55);
+  EXPECT_GT(table.light_cosine[1], 0.75);
   EXPECT_FALSE(table.has(order_setting(3))) << "the fabric's own order is 2";
   EXPECT_TRUE(table.has(order_setting(1)));
   for (const double sharpness : table.sharpness) {
-    const auto at = [&](const char* setting, double footprint) { return table.at(setting, sharpness, footprint); };
+    const auto at = [&](const char* setting, double footprint) { return table.at(setting, sharpness, footprint, 0.8); };
     for (const double footprint : table.footprint_mm) {
       EXPECT_EQ(at("path", footprint).bias_square, 0);
       EXPECT_GT(at("path", footprint).noise_square, at("exact", footprint).noise_square) << sharpness;
@@ -394,10 +471,12 @@ TEST(MeasureAccuracyStatistical, SaysWhatHoldsOfAnyFabric) {
     EXPECT_LT(at("exact", 1).bias_square, at("exact", 0.02).bias_square + 3 * at("exact", 0.02).bias_square_error);
   }
   // Light that both forms of visibility treat alike.
-  EXPECT_EQ(table.at("Gaussians", kDirectionalSharpness, 0.02).bias_square,
-            table.at("exact", kDirectionalSharpness, 0.02).bias_square);
-  EXPECT_EQ(table.at("signed distance", 1000, 0.02).bias_square, table.at("exact", 1000, 0.02).bias_square);
-  EXPECT_NE(table.at("signed distance", 3, 0.02).bias_square, table.at("exact", 3, 0.02).bias_square);
+  const auto bias = [&](const char* setting, double sharpness) {
+    return table.at(setting, sharpness, 0.02, 0.8).bias_square;
+  };
+  EXPECT_EQ(bias("Gaussians", kDirectionalSharpness), bias("exact", kDirectionalSharpness));
+  EXPECT_EQ(bias("signed distance", 1000), bias("exact", 1000));
+  EXPECT_NE(bias("signed distance", 3), bias("exact", 3));
 }
 
 }  // namespace

@@ -198,5 +198,22 @@ TEST(DualScatteringStability, ExtremeFibersGiveFiniteLight) {
   }
 }
 
+TEST(DualScatteringStability, ChannelsWithoutColourGiveFiniteLight) {
+  // Fresnel's fifth power takes such a channel through the smallest numbers there are, a little off the plane across the fiber.
+  FiberScattering fiber;
+  fiber.color_r = Rgbd(0.3, 0, 0);
+  fiber.color_tt = Rgbd(0.5, 0, 0);
+  fiber.beta_r = radians(1.0);
+  fiber.beta_tt = fiber.gamma_tt = radians(27.0);
+  const Stack stack(fiber, 4);
+  const Vec3 wo = Vec3(0.3F, -0.5F, 0.8F).normalized();
+  for (double theta = 1e-6; theta < 1e-2; theta *= 1.02) {
+    const auto t = static_cast<float>(theta);
+    const Vec3 light = {std::sin(t), 0.6F * std::cos(t), 0.8F * std::cos(t)};
+    const DualScattering::Parts parts = stack.dual.directional(point_with(wo), {0.1F, 0.5F, 0}, {light, light});
+    EXPECT_TRUE(parts.single.isFinite().all() && parts.multiple.isFinite().all()) << theta;
+  }
+}
+
 }  // namespace
 }  // namespace heddle
