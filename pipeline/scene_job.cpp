@@ -225,7 +225,7 @@ const SceneJob::Loaded& SceneJob::loaded_for(RenderMethod method) {
 
 /// One of the two renderers, set up for a picture.
 struct SceneJob::Shading {
-  std::vector<BcsdfTable> materials;
+  std::shared_ptr<const std::vector<BcsdfTable>> materials;
   std::optional<PathTracer> tracer;
   std::optional<PrecomputedRenderer> renderer;
 
@@ -238,12 +238,14 @@ struct SceneJob::Shading {
   }
 };
 
-std::unique_ptr<SceneJob::Shading> SceneJob::shading_for(const PictureRequest& request) {
+std::unique_ptr<SceneJob::Shading> SceneJob::shading_for(const PictureRequest& request,
+                                                         std::shared_ptr<const std::vector<BcsdfTable>> materials) {
   const Loaded& loaded = loaded_for(request.method);
   auto shading = std::make_unique<Shading>();
   if (traces_paths(request.method)) {
-    shading->materials = scene_materials(*loaded.scene);
-    shading->tracer.emplace(*loaded.scene, shading->materials, config_.lights, config_.background,
+    if (!materials) materials = std::make_shared<const std::vector<BcsdfTable>>(scene_materials(*loaded.scene));
+    shading->materials = std::move(materials);
+    shading->tracer.emplace(*loaded.scene, *shading->materials, config_.lights, config_.background,
                             path_tracer_settings(request));
     return shading;
   }
@@ -266,7 +268,8 @@ SceneJob::Crops SceneJob::render_crops(const PictureRequest& request, std::span<
   loaded_for(request.method);
   Crops result;
   const Stopwatch setup;
-  const std::unique_ptr<Shading> shading = shading_for(request);
+  const std::unique_ptr<Shading> shading = shading_for(request, crop_materials_);
+  if (shading->materials) crop_materials_ = shading->materials;
   result.setup = setup.elapsed();
   result.frames.resize(crops.size());
   const Stopwatch rendering;
@@ -318,7 +321,7 @@ PictureResult SceneJob::render(const PictureRequest& request, const std::string&
     shown = std::max(shown, now);
   };
 
-  const std::unique_ptr<Shading> shading = shading_for(request);
+  const std::unique_ptr<Shading> shading = shading_for(request, {});
   const FrameBuffers frame = shading->frame(request, camera, request.crop, report_progress);
   if (request.more) {
     PictureRequest made = request;

@@ -88,7 +88,8 @@ class SceneJob {
   std::vector<StageCost> precompute_costs(const PictureRequest& request);
 
   /// Frames of some rectangles of the view, in place of request.crop, without progress; builds what the picture needs. The
-  /// work that all of them share (tables of the scattering model, fits of environments) is in `setup`.
+  /// work that all of them share (tables of the scattering model, fits of environments) is in `setup`; path tracing's tables are
+  /// kept for the next call.
   struct Crops {
     std::vector<FrameBuffers> frames;  // [crop]
     WorkTime setup;
@@ -104,7 +105,9 @@ class SceneJob {
   /// The variant's, but the paper's own for `printed`.
   VisibilityBlend blend_for(RenderMethod method) const;
   Needs needs_for(RenderMethod method, const std::filesystem::path& fabric) const;
-  std::unique_ptr<Shading> shading_for(const PictureRequest& request);
+  /// Tables of the scattering model are made where there are none.
+  std::unique_ptr<Shading> shading_for(const PictureRequest& request,
+                                       std::shared_ptr<const std::vector<BcsdfTable>> materials);
   using Fabrics = std::map<std::filesystem::path, std::unique_ptr<FabricStages>>;
   Fabrics& printed_fabrics();
   std::vector<Artifact> packs_for(RenderMethod method);
@@ -117,6 +120,7 @@ class SceneJob {
   SceneVariant variant_;
   Fabrics fabrics_;
   std::optional<SurfaceStages> surface_stages_;
+  std::shared_ptr<const std::vector<BcsdfTable>> crop_materials_;  // of path tracing, once render_crops has made them
   Fabrics printed_fabrics_;  // the same, baked as printed; empty until a picture needs them
   std::map<RenderMethod, std::unique_ptr<Loaded>> loaded_;
 };

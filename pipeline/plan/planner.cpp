@@ -15,6 +15,8 @@ constexpr double kAim = 0.92;
 
 // Standard errors less at best: finding out more costs little beside what it may save.
 constexpr double kHope = 0.7;
+// Standard errors more at which it is worth looking twice.
+constexpr double kDoubt = 2;
 // More caution of the bias is taken as long as noise keeps this share of its room: that many more samples at most.
 constexpr double kMoreCaution = 1;
 constexpr double kRoomKept = 0.88;
@@ -55,6 +57,10 @@ std::optional<Offer> offer(const Candidate& candidate, double tolerance, int pic
   result.expected_error =
       std::sqrt(std::max(0.0, candidate.bias_square.value) + std::max(0.0, candidate.noise_square.value) / result.spp);
   return result;
+}
+
+bool may_miss(const Candidate& candidate, double tolerance) {
+  return cautious(candidate.bias_square, kDoubt) > kAim * tolerance * tolerance;
 }
 
 int first_samples(const Candidate& candidate, double tolerance) {

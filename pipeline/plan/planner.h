@@ -40,6 +40,9 @@ struct Offer {
 inline constexpr int kMostSamples = 1 << 20;
 std::optional<Offer> offer(const Candidate& candidate, double tolerance, int pictures);
 
+/// Is the bias alone too large for the tolerance if it is two standard errors larger than thought?
+bool may_miss(const Candidate& candidate, double tolerance);
+
 /// The samples of a picture to begin with: what it needs if its noise is what it is thought to be, caution aside; the picture
 /// itself then says how many more (more_samples). At least 2, which tell of noise.
 int first_samples(const Candidate& candidate, double tolerance);

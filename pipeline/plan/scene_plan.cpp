@@ -31,6 +31,8 @@ constexpr int kMostTries = 16;
 constexpr double kTryShare = 0.2;
 // Where a way would take at most this share of the time of the one that is sure to be good enough, it is worth finding out more of it.
 constexpr double kHope = 0.5;
+// Where what is chosen may well miss the tolerance, finding out more of it may take this share of what it offers.
+constexpr double kDoubtShare = 0.25;
 // Building its data and trying it may take this share of what it may save.
 constexpr double kBuildShare = 0.25;
 // Light from one cloth to another is known well enough if its squared error is this share of the squared tolerance, or less.
@@ -166,7 +168,10 @@ class ScenePlanner {
       thought.value += std::max(0.0, light_between_.value) + together;
       thought.error = std::hypot(thought.error, light_between_.error);
     }
-    way.candidate.bias_square = way.pilot ? weighed(thought, way.pilot->bias_square, way.pilot->unseen) : thought;
+    way.candidate.bias_square = thought;
+    if (!way.pilot) return;
+    const Estimate both = weighed(thought, way.pilot->bias_square, way.pilot->unseen);
+    if (both.value > thought.value || way.pilot->may_lower) way.candidate.bias_square = both;
   }
 
   /// An absolute square relative to the mean radiance; the mean's own error counts.
@@ -690,7 +695,7 @@ class ScenePlanner {
     if (!way.pilot || way.pilot->samples < pilot_samples()) {
       const double affordable = kBuildShare * (offered.seconds - hoped.seconds);
       if (way.candidate.build_seconds + seconds_to_try(way) > affordable || !may_try(way)) return false;
-      try_out(way);
+      try_out(way, true);
       return true;
     }
     return more_paths(kPilotShare * offered.seconds);
@@ -704,9 +709,14 @@ class ScenePlanner {
       return error >= kNoiseKnown && has_rival(offered) && more_paths(kPilotShare * offered.seconds);
     }
     if (lacks_light_between(way) && know_light_between(offered)) return true;
-    if (way.tried || !may_try(way) || seconds_to_try(way) > kTryShare * offered.seconds) return false;
-    try_out(way);
-    return true;
+    if (!may_try(way)) return false;
+    const bool in_doubt = may_miss(way.candidate, plan_.question.tolerance);
+    if (!way.pilot || (in_doubt && way.pilot->samples < pilot_samples())) {
+      if (seconds_to_try(way) > (in_doubt ? kDoubtShare : kTryShare) * offered.seconds) return false;
+      try_out(way, false);
+      return true;
+    }
+    return in_doubt && more_paths(kDoubtShare * offered.seconds);
   }
 
   /// Does another way not cost much more?
@@ -755,7 +765,7 @@ class ScenePlanner {
     return true;
   }
 
-  void try_out(Way& way) {
+  void try_out(Way& way, bool hoped_for) {
     if (way.variant != SceneVariant{}) {
       if (!other_job_ || way.variant != other_variant_) {
         const Stopwatch watch;
@@ -779,7 +789,8 @@ class ScenePlanner {
     const double noise =
         2 * (plan_.ways[0].candidate.noise_square.value / path_spp_ + now.noise_square.value / samples);
     measured.error = std::max(measured.error, noise / std::sqrt(pilot_pixels_));
-    way.pilot = {measured, pilot_samples(), std::max(0.0, 1 - pilot_pixels_ / pixels_)};
+    way.pilot = {measured, pilot_samples(), std::max(0.0, 1 - pilot_pixels_ / pixels_),
+                 hoped_for || (way.pilot && way.pilot->may_lower)};
     way.tried = true;
     add_up(way);
     // What differs from the table here does so for the like of it too.

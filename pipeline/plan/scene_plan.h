@@ -54,6 +54,9 @@ struct Way {
     Estimate bias_square;
     double samples;  // of paths
     double unseen;   // share of the picture's pixels
+    // Rare large squares make the mean, and a pilot that has met none of them says too little: it is believed only of a way that would not do
+    // otherwise.
+    bool may_lower;
   };
   std::optional<Pilot> pilot = {};
 };

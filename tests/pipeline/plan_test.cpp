@@ -77,6 +77,8 @@ TEST(Plan, MoreCautionWhereItCostsLittle) {
   Candidate near = kCandidates[1];
   near.bias_square = {0.8 * 0.04, 0.3 * 0.04};
   EXPECT_TRUE(offer(near, 0.2, 1)) << "not turned away for what it may be at worst";
+  EXPECT_TRUE(may_miss(near, 0.2));
+  EXPECT_FALSE(may_miss(near, 0.3));
   near.bias_square.value = 0.9 * 0.04;
   EXPECT_FALSE(offer(near, 0.2, 1));
 }
