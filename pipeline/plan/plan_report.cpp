@@ -23,13 +23,9 @@ std::string seconds_text(double seconds) {
   return seconds < 9.95 ? fmt::format("{:.2g} s", seconds) : duration_text(seconds);
 }
 
-bool is_precomputed(const Way& way) {
-  return way.method == RenderMethod::kExact || way.method == RenderMethod::kVolume;
-}
-
 /// Which form of visibility a way takes for a light.
 const char* visibility_of(const Way& way, const Light& light) {
-  if (!is_precomputed(way)) return "none";
+  if (!is_precomputed(way.method)) return "none";
   if (light.type == LightType::kEnvironment) return "by the sharpness of its Gaussians";
   if (light.is_directional()) return "signed distances";
   const bool distance = way.variant.blend.uses_distance(light.sharpness);
@@ -49,7 +45,7 @@ Json cloth_json(const ScenePlan& plan, const Way& way, std::size_t k) {
   if (cloth.surface) return {{"drawn_by", "surface"}, {"surface", cloth.surface->name}};
   if (way.variant.stand_ins.contains(k)) return {{"drawn_by", "surface"}, {"surface", cloth.far_surface->name}};
   Json json = {{"drawn_by", "fibers"}, {"fabric", cloth.fabric.generic_string()}};
-  if (!is_precomputed(way)) return json;
+  if (!is_precomputed(way.method)) return json;
   const SceneVariant::OfFabric of = way.variant.of(cloth.fabric);
   json["cell_size"] = of.variant.cell_size;
   json["order"] = of.order ? Json(*of.order) : Json(nullptr);
@@ -61,7 +57,7 @@ std::string cloth_text(const ScenePlan& plan, const Way& way, std::size_t k) {
   const Json json = cloth_json(plan, way, k);
   if (json.at("drawn_by") == "surface") return "surface model " + json.at("surface").get<std::string>();
   std::string text = "fibers";
-  if (!is_precomputed(way)) return text;
+  if (!is_precomputed(way.method)) return text;
   text += fmt::format(", cells x {:g}", json.at("cell_size").get<double>());
   text += json.at("order").is_null() ? ", the fabric's order" : fmt::format(", order {}", json.at("order").get<int>());
   if (json.contains("voxel_rate")) text += fmt::format(", voxels x {:g}", json.at("voxel_rate").get<double>());
@@ -98,7 +94,7 @@ Json way_json(const ScenePlan& plan, const Way& way) {
                {"method", render_method_name(way.method)},
                {"bias", root(candidate.bias_square.value)},
                {"noise_of_a_sample", root(candidate.noise_square.value)},
-               {"known_from", way.tried ? "a pilot of this view" : "the table of the fabric"},
+               {"known_from", way.tried() ? "a pilot of this view" : "the table of the fabric"},
                {"build_seconds", candidate.build_seconds},
                {"setup_seconds", candidate.setup_seconds},
                {"seconds_per_sample_per_pixel", candidate.seconds_per_spp}};
@@ -140,14 +136,14 @@ std::string plan_text(const ScenePlan& plan) {
                                            seen.footprint_mm)
                              : "\n";
     }
-    for (std::size_t l = 0; l < plan.scene.lights.size() && is_precomputed(way); ++l) {
+    for (std::size_t l = 0; l < plan.scene.lights.size() && is_precomputed(way.method); ++l) {
       const Light& light = plan.scene.lights[l];
       text += fmt::format("light {:<3} {}: visibility by {}\n", l + 1, light_name(light), visibility_of(way, light));
     }
     text += fmt::format("error     {} expected: {} apart from noise ({}), {} noise\n",
                         percent(plan.offer->expected_error), percent(root(way.candidate.bias_square.value)),
                         traces_paths(way.method) && way.family == "path" ? "none by definition"
-                        : way.tried                                      ? "table and pilot"
+                        : way.tried()                                    ? "table and pilot"
                                                                          : "table",
                         percent(root(way.candidate.noise_square.value / plan.offer->spp)));
     text += fmt::format("cost      {}: {} to build, {} per picture; the plan took {}\n",

@@ -14,7 +14,7 @@ constexpr double kCaution = 0.25;
 constexpr double kAim = 0.92;
 
 // Standard errors less at best: finding out more costs little beside what it may save.
-constexpr double kHope = 0.7;
+constexpr double kOptimism = 0.7;
 // Standard errors more at which it is worth looking twice.
 constexpr double kDoubt = 2;
 // More caution of the bias is taken as long as noise keeps this share of its room: that many more samples at most.
@@ -115,7 +115,7 @@ double best_tolerance(std::span<const Candidate> candidates) {
 }
 
 Estimate at_best(const Estimate& square) {
-  return {std::max(0.0, square.value - kHope * square.error), 0};
+  return {std::max(0.0, square.value - kOptimism * square.error), 0};
 }
 
 Estimate weighed(Estimate thought, Estimate measured, double unseen) {

@@ -90,9 +90,9 @@ class ScenePlanner {
     const Stopwatch watch;
     const int first = static_cast<int>(std::clamp(pixels_ / 4, 256.0, static_cast<double>(kFirstPixels)));
     trace_pilot(first, kPilotSamples);
-    find_fabrics();
     look_at_cloths();
     add_path();
+    find_fabrics();
     // Surface models are lit the same way by all methods.
     if (!fabrics_.empty() && read_tables()) add_other_ways();
     settle();
@@ -315,7 +315,6 @@ class ScenePlanner {
     Way way;
     way.family = "path";
     way.method = RenderMethod::kPath;
-    way.tried = true;
     way.candidate = {.name = "path",
                      .bias_square = {},
                      .noise_square = relative(path_variance_),
@@ -418,7 +417,7 @@ class ScenePlanner {
   Settings settings_of(RenderMethod method, const SceneVariant& variant,
                        const SceneVariant::OfFabric& of_fabric) const {
     Settings settings{render_method_name(method), {}};
-    if (method != RenderMethod::kExact && method != RenderMethod::kVolume) return settings;
+    if (!is_precomputed(method)) return settings;
     if (variant.blend == kSignedDistanceOnly) settings.changes.emplace_back(kDistanceSetting, "exact");
     if (variant.blend == kLobesOnly) settings.changes.emplace_back(kGaussiansSetting, "exact");
     if (of_fabric.order) settings.changes.emplace_back(order_setting(*of_fabric.order), "exact");
@@ -557,8 +556,8 @@ class ScenePlanner {
       } else {
         const Fabric& fabric = *fabric_of(cloth.fabric);
         answer = ask(*fabric.table, settings_of(method, variant, variant.of(cloth.fabric)), k);
-        const bool precomputed = method == RenderMethod::kExact || method == RenderMethod::kVolume;
-        if (precomputed && !fabric.light_from_both_sides) add_light_from_behind(k, fabric.table->through, answer);
+        if (is_precomputed(method) && !fabric.light_from_both_sides)
+          add_light_from_behind(k, fabric.table->through, answer);
       }
       // The cloth's light, squared, relative to the picture's: (light_share / share)^2, on `share` of the pixels.
       const double weight = of.light_share * of.light_share / of.share;
@@ -624,7 +623,7 @@ class ScenePlanner {
 
   std::string name_of(const Way& way) const {
     std::string name = render_method_name(way.method);
-    if (way.method == RenderMethod::kExact || way.method == RenderMethod::kVolume) {
+    if (is_precomputed(way.method)) {
       if (way.variant.blend == kSignedDistanceOnly) name += fmt::format(", {}", kDistanceSetting);
       if (way.variant.blend == kLobesOnly) name += fmt::format(", {}", kGaussiansSetting);
       for (const auto& fabric : fabrics_) {
@@ -652,7 +651,7 @@ class ScenePlanner {
 
   std::vector<bool> tried() const {
     std::vector<bool> list;
-    for (const Way& way : plan_.ways) list.push_back(way.tried);
+    for (const Way& way : plan_.ways) list.push_back(way.tried());
     return list;
   }
 
@@ -791,14 +790,13 @@ class ScenePlanner {
     measured.error = std::max(measured.error, noise / std::sqrt(pilot_pixels_));
     way.pilot = {measured, pilot_samples(), std::max(0.0, 1 - pilot_pixels_ / pixels_),
                  hoped_for || (way.pilot && way.pilot->may_lower)};
-    way.tried = true;
     add_up(way);
     // What differs from the table here does so for the like of it too.
     const double noise_ratio = now.noise_square.value / before.noise_square.value;
     const double time_ratio = now.seconds_per_spp / before.seconds_per_spp;
     const double more_bias = now.bias_square.value - before.bias_square.value;
     for (Way& other : plan_.ways) {
-      if (other.tried || other.family != way.family) continue;
+      if (other.tried() || other.family != way.family) continue;
       Candidate& like = other.candidate;
       like.noise_square = {like.noise_square.value * noise_ratio,
                            like.noise_square.value * now.noise_square.error / now.noise_square.value};

@@ -48,7 +48,6 @@ struct Way {
   Estimate bias_square;   // against what the method claims to compute: the candidate's without the light between cloths
   double mean_error = 0;  // of the picture's mean radiance, relative, as the tables have it; part of bias_square
   Candidate candidate;
-  bool tried = false;  // its noise and speed are this view's own, by a pilot
   /// What the pilot said of its error, against paths that miss nothing.
   struct Pilot {
     Estimate bias_square;
@@ -59,7 +58,14 @@ struct Way {
     bool may_lower;
   };
   std::optional<Pilot> pilot = {};
+  /// Its noise and speed are this view's own, by a pilot; the pilot of paths is the first.
+  bool tried() const { return family == "path" || pilot.has_value(); }
 };
+
+/// Renders fibers from precomputed data, as the paper's methods do.
+inline bool is_precomputed(RenderMethod method) {
+  return method == RenderMethod::kExact || method == RenderMethod::kVolume;
+}
 
 /// What the pilot saw of one cloth of the scene.
 struct SeenCloth {

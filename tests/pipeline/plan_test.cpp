@@ -64,7 +64,7 @@ TEST(Plan, WhatIsNotKnownCostsSamples) {
 }
 
 TEST(Plan, MoreCautionWhereItCostsLittle) {
-  // Two standard errors are room enough beside a bias far below the tolerance, and would leave none beside one near it.
+  // A standard error has room enough beside a bias far below the tolerance, and would leave none beside one near it.
   const auto samples_more = [](double bias_square) {
     Candidate unsure = kCandidates[1];
     unsure.bias_square = {bias_square, 0};
