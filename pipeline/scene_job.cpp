@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "formats/atomic_file.h"
@@ -83,7 +84,8 @@ struct SceneJob::Loaded {
   std::map<fs::path, FabricPack> packs;  // by fabric file
   std::map<fs::path, std::shared_ptr<const TileScene>> tiles;
   std::unique_ptr<ClothScene> scene;
-  std::vector<Warning> warnings;  // of the packs
+  std::vector<BcsdfTable> materials;  // of the scene
+  std::vector<Warning> warnings;      // of the packs
   std::vector<std::shared_ptr<const InteractiveSurface>> interactive;  // [surface cloth]
 };
 
@@ -212,7 +214,14 @@ const SceneJob::Loaded& SceneJob::loaded_for(RenderMethod method) {
   }
   std::vector<std::shared_ptr<const TileScene>> tiles;
   for (const ClothConfig& cloth : config_.cloths) {
-    if (!cloth.surface) tiles.push_back(loaded->tiles.at(cloth.fabric));
+    if (cloth.surface) continue;
+    // In the order of ClothScene::materials: of each tile once.
+    const std::shared_ptr<const TileScene>& tile = loaded->tiles.at(cloth.fabric);
+    if (std::find(tiles.begin(), tiles.end(), tile) == tiles.end()) {
+      const std::vector<BcsdfTable>& own = loaded->packs.at(cloth.fabric).materials;
+      loaded->materials.insert(loaded->materials.end(), own.begin(), own.end());
+    }
+    tiles.push_back(tile);
   }
   loaded->scene.reset(new ClothScene(make_cloth_scene(config_, tiles)));  // cannot be moved: built in place
   for (const auto& [file, pack] : loaded->packs) {
@@ -225,7 +234,6 @@ const SceneJob::Loaded& SceneJob::loaded_for(RenderMethod method) {
 
 /// One of the two renderers, set up for a picture.
 struct SceneJob::Shading {
-  std::shared_ptr<const std::vector<BcsdfTable>> materials;
   std::optional<PathTracer> tracer;
   std::optional<PrecomputedRenderer> renderer;
 
@@ -239,13 +247,11 @@ struct SceneJob::Shading {
 };
 
 std::unique_ptr<SceneJob::Shading> SceneJob::shading_for(const PictureRequest& request,
-                                                         std::shared_ptr<const std::vector<BcsdfTable>> materials) {
+                                                         std::optional<int> transfer_order) {
   const Loaded& loaded = loaded_for(request.method);
   auto shading = std::make_unique<Shading>();
   if (traces_paths(request.method)) {
-    if (!materials) materials = std::make_shared<const std::vector<BcsdfTable>>(scene_materials(*loaded.scene));
-    shading->materials = std::move(materials);
-    shading->tracer.emplace(*loaded.scene, *shading->materials, config_.lights, config_.background,
+    shading->tracer.emplace(*loaded.scene, loaded.materials, config_.lights, config_.background,
                             path_tracer_settings(request));
     return shading;
   }
@@ -258,18 +264,19 @@ std::unique_ptr<SceneJob::Shading> SceneJob::shading_for(const PictureRequest& r
                                      .volume = request.method == RenderMethod::kVolume,
                                      .shadow_sigma_mm = config_.shadow_sigma_mm,
                                      .blend = blend_for(request.method),
+                                     .transfer_order = transfer_order,
                                      .interactive = loaded.interactive};
   shading->renderer.emplace(*loaded.scene, packs, config_.lights, config_.background, settings);
   return shading;
 }
 
-SceneJob::Crops SceneJob::render_crops(const PictureRequest& request, std::span<const PixelRect> crops) {
+SceneJob::Crops SceneJob::render_crops(const PictureRequest& request, std::span<const PixelRect> crops,
+                                        std::optional<int> transfer_order) {
   const Camera camera(request.camera);
   loaded_for(request.method);
   Crops result;
   const Stopwatch setup;
-  const std::unique_ptr<Shading> shading = shading_for(request, crop_materials_);
-  if (shading->materials) crop_materials_ = shading->materials;
+  const std::unique_ptr<Shading> shading = shading_for(request, transfer_order);
   result.setup = setup.elapsed();
   result.frames.resize(crops.size());
   const Stopwatch rendering;
@@ -321,7 +328,7 @@ PictureResult SceneJob::render(const PictureRequest& request, const std::string&
     shown = std::max(shown, now);
   };
 
-  const std::unique_ptr<Shading> shading = shading_for(request, {});
+  const std::unique_ptr<Shading> shading = shading_for(request);
   const FrameBuffers frame = shading->frame(request, camera, request.crop, report_progress);
   if (request.more) {
     PictureRequest made = request;

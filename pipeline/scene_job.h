@@ -88,14 +88,15 @@ class SceneJob {
   std::vector<StageCost> precompute_costs(const PictureRequest& request);
 
   /// Frames of some rectangles of the view, in place of request.crop, without progress; builds what the picture needs. The
-  /// work that all of them share (tables of the scattering model, fits of environments) is in `setup`; path tracing's tables are
-  /// kept for the next call.
+  /// work that all of them share (fits of environments) is in `setup`.
   struct Crops {
     std::vector<FrameBuffers> frames;  // [crop]
     WorkTime setup;
     WorkTime rendering;
   };
-  Crops render_crops(const PictureRequest& request, std::span<const PixelRect> crops);
+  /// transfer_order: see PrecomputedSettings.
+  Crops render_crops(const PictureRequest& request, std::span<const PixelRect> crops,
+                     std::optional<int> transfer_order = {});
   /// The scene with nothing but its fibers.
   const ClothScene& fibers_scene();
 
@@ -105,9 +106,7 @@ class SceneJob {
   /// The variant's, but the paper's own for `printed`.
   VisibilityBlend blend_for(RenderMethod method) const;
   Needs needs_for(RenderMethod method, const std::filesystem::path& fabric) const;
-  /// Tables of the scattering model are made where there are none.
-  std::unique_ptr<Shading> shading_for(const PictureRequest& request,
-                                       std::shared_ptr<const std::vector<BcsdfTable>> materials);
+  std::unique_ptr<Shading> shading_for(const PictureRequest& request, std::optional<int> transfer_order = {});
   using Fabrics = std::map<std::filesystem::path, std::unique_ptr<FabricStages>>;
   Fabrics& printed_fabrics();
   std::vector<Artifact> packs_for(RenderMethod method);
@@ -120,7 +119,6 @@ class SceneJob {
   SceneVariant variant_;
   Fabrics fabrics_;
   std::optional<SurfaceStages> surface_stages_;
-  std::shared_ptr<const std::vector<BcsdfTable>> crop_materials_;  // of path tracing, once render_crops has made them
   Fabrics printed_fabrics_;  // the same, baked as printed; empty until a picture needs them
   std::map<RenderMethod, std::unique_ptr<Loaded>> loaded_;
 };

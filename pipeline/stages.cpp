@@ -32,7 +32,7 @@ namespace fs = std::filesystem;
 constexpr std::uint32_t kSegmentsPerChunk = 256;
 constexpr std::uint32_t kCellsPerChunk = 32;
 
-constexpr int kAccuracyVersion = 5;
+constexpr int kAccuracyVersion = 8;
 
 void write_transfer_chunk(const fs::path& path, const TransferChunk& chunk, int order) {
   const auto cells = static_cast<std::uint64_t>(chunk.paths.size());

@@ -106,7 +106,11 @@ PrecomputedRenderer::PrecomputedRenderer(const ClothScene& scene, std::span<cons
         first.dual = std::make_shared<const DualScattering>(scene.tile(cloth), pack.materials);
       } else {
         first.single = single_scattering_of(pack, settings.shading, settings.blend);
-        first.multiple.emplace(*pack.transfer, pack.materials, pack.bundle_tangent);
+        if (settings.transfer_order) {
+          first.cut_transfer = std::make_shared<const Transfer>(cut_to_order(*pack.transfer, *settings.transfer_order));
+        }
+        first.multiple.emplace(first.cut_transfer ? *first.cut_transfer : *pack.transfer, pack.materials,
+                               pack.bundle_tangent);
       }
     }
     cloths_.push_back(known->second);

@@ -57,6 +57,8 @@ struct PrecomputedSettings {
   // Deviation of the Gaussian; the thickness of the cloth where absent.
   std::optional<double> shadow_sigma_mm;
   VisibilityBlend blend;
+  // Highest band of the transfer that is used; all of them where absent.
+  std::optional<int> transfer_order;
   // [surface cloth] null, or missing at the end: sampled.
   std::vector<std::shared_ptr<const InteractiveSurface>> interactive;
 };
@@ -93,6 +95,7 @@ class PrecomputedRenderer {
     const FabricPack* pack;
     std::shared_ptr<const IdBricks> bricks;
     std::shared_ptr<const SingleScatteringModel> single;
+    std::shared_ptr<const Transfer> cut_transfer;  // in place of the pack's
     std::optional<MultipleScattering> multiple;
     std::shared_ptr<const DualScattering> dual;  // then neither single nor multiple
     double shadow_sigma;                         // mm

@@ -54,6 +54,34 @@ std::optional<ConeTransfer> get_cones(const TensorFile& file, std::uint64_t cell
                       file.get<float>("cone_moments", {cells, ConeTransfer::kWidths, n, ConeTransfer::kAzimuths, 3})};
 }
 
+Transfer cut_to_order(const Transfer& transfer, int order) {
+  if (order >= transfer.order) return transfer;
+  Transfer result = transfer;
+  result.order = order;
+  const auto all = static_cast<std::size_t>(transfer.coefficients());
+  const auto kept = static_cast<std::size_t>(result.coefficients());
+  // The first kept_rows of every `rows` rows, and the first kept_columns of every row.
+  const auto cut = [](std::vector<float>& values, std::size_t rows, std::size_t columns, std::size_t kept_rows,
+                      std::size_t kept_columns) {
+    std::vector<float> low;
+    for (std::size_t row = 0; row < values.size() / columns; ++row) {
+      if (row % rows >= kept_rows) continue;
+      const auto first = values.begin() + static_cast<std::ptrdiff_t>(row * columns);
+      low.insert(low.end(), first, first + static_cast<std::ptrdiff_t>(kept_columns));
+    }
+    values = std::move(low);
+  };
+  cut(result.matrices, all, 3 * all, kept, 3 * kept);
+  cut(result.standard_error, 1, 3 * static_cast<std::size_t>(transfer.order + 1), 1,
+      3 * static_cast<std::size_t>(order + 1));
+  if (result.cones) {
+    constexpr std::size_t kOnCone = 3 * ConeTransfer::kAzimuths;
+    cut(result.cones->harmonics, all, 3 * all, kept, 3 * kept);
+    cut(result.cones->moments, all, kOnCone, kept, kOnCone);
+  }
+  return result;
+}
+
 void write_transfer(const std::filesystem::path& path, const Transfer& t,
                     const std::map<std::string, std::string>& metadata) {
   const auto n = static_cast<std::uint64_t>(t.coefficients());

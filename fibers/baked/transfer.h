@@ -40,6 +40,9 @@ struct Transfer {
   void incoming_on_cones(std::uint32_t cell, const float* light, float* result) const;
 };
 
+/// The same as baked to a lower order.
+Transfer cut_to_order(const Transfer& transfer, int order);
+
 void write_transfer(const std::filesystem::path& path, const Transfer& transfer,
                     const std::map<std::string, std::string>& metadata);
 Transfer read_transfer(const std::filesystem::path& path);

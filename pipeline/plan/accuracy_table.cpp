@@ -13,7 +13,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr int kFormatVersion = 2;
+constexpr int kFormatVersion = 3;
 
 /// Between which two values of an increasing list, and how far on the way.
 struct Place {
@@ -39,11 +39,12 @@ double logarithm(double value) {
   return std::log(std::max(value, 1e-3));
 }
 
-const Accuracy kNothing{0, 0, 0, Rgbd::Zero()};
+const Accuracy kNothing{0, 0, 0, 0, Rgbd::Zero()};
 void add_weighted(const Accuracy& entry, double weight, Accuracy& sum) {
   sum.bias_square += weight * entry.bias_square;
   sum.bias_square_error += weight * entry.bias_square_error;
   sum.noise_square += weight * entry.noise_square;
+  sum.change_square += weight * entry.change_square;
   sum.color_ratio += weight * entry.color_ratio;
 }
 
@@ -53,6 +54,7 @@ Json entries_json(const std::vector<Accuracy>& entries) {
     json.push_back({{"bias_square", entry.bias_square},
                     {"bias_square_error", entry.bias_square_error},
                     {"noise_square", entry.noise_square},
+                    {"change_square", entry.change_square},
                     {"color_ratio", {entry.color_ratio[0], entry.color_ratio[1], entry.color_ratio[2]}}});
   }
   return json;
@@ -63,7 +65,8 @@ std::vector<Accuracy> entries_of(const Json& json) {
   for (const Json& values : json) {
     const auto ratio = values.at("color_ratio").get<std::array<double, 3>>();
     entries.push_back({values.at("bias_square").get<double>(), values.at("bias_square_error").get<double>(),
-                       values.at("noise_square").get<double>(), Rgbd(ratio[0], ratio[1], ratio[2])});
+                       values.at("noise_square").get<double>(), values.at("change_square").get<double>(),
+                       Rgbd(ratio[0], ratio[1], ratio[2])});
   }
   return entries;
 }
@@ -107,6 +110,12 @@ Accuracy AccuracyTable::at_bent(const std::string& name, double light_sharpness)
   return result;
 }
 
+double AccuracyTable::between_at(double light_sharpness) const {
+  if (bent_between.empty()) return 0;
+  const Place light = place_of(sharpness, light_sharpness, logarithm);
+  return std::max(0.0, (1 - light.share) * bent_between[light.low] + light.share * bent_between[light.high]);
+}
+
 Json accuracy_json(const AccuracyTable& table) {
   Json json = {{"format", "heddle accuracy"},
                {"version", kFormatVersion},
@@ -118,6 +127,8 @@ Json accuracy_json(const AccuracyTable& table) {
                {"light_cosine", table.light_cosine},
                {"bent_footprint_mm", table.bent_footprint_mm},
                {"bent_light_cosine", table.bent_light_cosine},
+               {"bent_between", table.bent_between},
+               {"bent_enclosure_square", table.bent_enclosure_square},
                {"color", {table.color[0], table.color[1], table.color[2]}},
                {"through", table.through}};
   json["settings"] = Json::array();
@@ -156,6 +167,8 @@ AccuracyTable read_accuracy(const std::filesystem::path& path) {
     table.light_cosine = json.at("light_cosine").get<std::vector<double>>();
     table.bent_footprint_mm = json.at("bent_footprint_mm").get<double>();
     table.bent_light_cosine = json.at("bent_light_cosine").get<double>();
+    table.bent_between = json.at("bent_between").get<std::vector<double>>();
+    table.bent_enclosure_square = json.at("bent_enclosure_square").get<double>();
     const auto color = json.at("color").get<std::array<double, 3>>();
     table.color = Rgbd(color[0], color[1], color[2]);
     table.through = json.at("through").get<double>();
@@ -167,6 +180,9 @@ AccuracyTable read_accuracy(const std::filesystem::path& path) {
     if (!increases(table.sharpness) || !increases(table.footprint_mm) || !increases(table.light_cosine) ||
         table.threads < 1) {
       throw FileError(path.string() + ": an accuracy table without increasing sharpnesses, footprints and cosines");
+    }
+    if (!table.bent_between.empty() && table.bent_between.size() != table.sharpness.size()) {
+      throw FileError(path.string() + ": light from fold to fold is not given for every sharpness");
     }
     for (const Json& entry : json.at("settings")) {
       SettingAccuracy setting;
@@ -215,6 +231,11 @@ std::string accuracy_text(const AccuracyTable& table) {
         text += l == 0 ? fmt::format("{:>15.3g}\n", 1e6 * setting.seconds_per_sample) : "\n";
       }
     }
+  }
+  for (std::size_t l = 0; l < table.bent_between.size(); ++l) {
+    text += fmt::format("{} {:.1f} %{}", l == 0 ? "light from fold to fold, by sharpness:" : ",",
+                        100 * std::sqrt(std::max(0.0, table.bent_between[l])),
+                        l + 1 < table.bent_between.size() ? "" : "\n");
   }
   text += fmt::format("lit from behind: {:.2f} of what it shows lit from its face\n", table.through);
   for (const auto& [part, cost] : table.costs) {

@@ -24,6 +24,7 @@ struct Accuracy {
   double bias_square = 0;        // mean square of (setting - path tracing), noise taken out; may be slightly negative
   double bias_square_error = 0;  // one standard error, for another pair of view and light
   double noise_square = 0;       // variance of one sample of a pixel
+  double change_square = 0;      // mean square of (setting - the one that it is a change of)
   Rgbd color_ratio = Rgbd::Ones();
 };
 
@@ -45,6 +46,10 @@ struct AccuracyTable {
   std::vector<double> light_cosine;  // [height of the light] to the normal of the flat cloth, increasing
   double bent_footprint_mm = 0;
   double bent_light_cosine = 0;
+  // Light from fold to fold, which the entries of the folded swatch leave out: [light] squared error without it, and the mean square of
+  // what the folds see of each other (enclosure.h). Empty and 0 of surfaces.
+  std::vector<double> bent_between;
+  double bent_enclosure_square = 0;
   Rgbd color = Rgbd::Ones();  // of the flat cloth, relative to the mean of the channels
   // Radiance of the flat cloth lit from behind, relative to that under the same light from its face; 0 of surfaces, which are alike on both sides.
   double through = 0;
@@ -57,6 +62,8 @@ struct AccuracyTable {
   Accuracy at(const std::string& setting, double sharpness, double footprint_mm, double light_cosine) const;
   /// The same of the folded swatch.
   Accuracy at_bent(const std::string& setting, double sharpness) const;
+  /// bent_between, linear in the logarithm of sharpness; 0 where there is none.
+  double between_at(double sharpness) const;
   /// Squared error of the mean colour, part of bias_square: relative to the squared mean radiance.
   double mean_square(const Rgbd& color_ratio) const { return (color * (color_ratio - 1)).square().mean(); }
 };

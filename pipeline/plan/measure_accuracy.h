@@ -3,12 +3,13 @@
 // Fills an accuracy table: every setting against path tracing on a flat swatch of the fabric, and on one that lies in folds over
 // black, by the renderers' own code.
 //
-// Eight pairs of view and light, four of them with low light, five sharpnesses; each a picture of 32 x 32 pixels as wide as a fiber. Errors of wider pixels
-// come from the same pictures: differences, averaged over squares of pixels, before they are squared. Path tracing and method
-// share their eye rays (probe.h). Squares are relative to the squared mean radiance of their own pair, and pairs of one height
-// of the light are averaged; their spread is the error. Folds bring light that grazes, shadows that end, and light from one slope to the next: two pairs,
-// pixels of 6 mm (errors of folds are wide, and noise averages), many samples each. The flat swatch is path-traced once more under
-// directional light from behind.
+// Eight pairs of view and light, four of them with low light, five sharpnesses; each a picture of 32 x 32 pixels as wide as a fiber.
+// Errors of wider pixels come from the same pictures: differences, averaged over squares of pixels, before they are squared. Path
+// tracing and method share their eye rays (probe.h). Squares are relative to the squared mean radiance of their own pair, and pairs of
+// one height of the light are averaged; their spread is the error. Folds bring light that grazes and shadows that end: four pairs, pixels
+// of 4 mm (errors of folds are wide, and noise averages), many samples each, against paths that end where they leave the cloth; light
+// from fold to fold is measured apart, with what the folds see of each other. The flat swatch is path-traced once more under directional
+// light from behind. What a setting changes is measured against the one that it is a change of, too: both share all random numbers.
 // Settings, all else as the fabric says:
 //   path, path-6, dual-scattering             nothing baked
 //   exact, volume                             everything
@@ -50,16 +51,13 @@ struct AccuracyData {
   std::map<double, IdVolume> voxels;  // by factor
 };
 
-/// The transfer as baked to a lower order.
-Transfer cut_to_order(const Transfer& transfer, int order);
-
 /// How much is measured; less is for tests.
 struct AccuracyEffort {
   int pixels = 32;        // along an edge of a flat picture, a power of two of at least 32
-  int bent_pixels = 8;    // of a folded one
+  int bent_pixels = 12;   // of a folded one
   int path_samples = 32;  // per pixel, flat; `bent_factor` times as many in folds; even
   int method_samples = 8;
-  int bent_factor = 32;
+  int bent_factor = 16;
 };
 
 /// Called with the share done, 0 .. 1; may throw to stop.

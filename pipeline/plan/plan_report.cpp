@@ -94,7 +94,7 @@ Json way_json(const ScenePlan& plan, const Way& way) {
                {"method", render_method_name(way.method)},
                {"bias", root(candidate.bias_square.value)},
                {"noise_of_a_sample", root(candidate.noise_square.value)},
-               {"known_from", way.tried() ? "a pilot of this view" : "the table of the fabric"},
+               {"known_from", way.tried ? "a pilot of this view" : "the table of the fabric"},
                {"build_seconds", candidate.build_seconds},
                {"setup_seconds", candidate.setup_seconds},
                {"seconds_per_sample_per_pixel", candidate.seconds_per_spp}};
@@ -143,7 +143,7 @@ std::string plan_text(const ScenePlan& plan) {
     text += fmt::format("error     {} expected: {} apart from noise ({}), {} noise\n",
                         percent(plan.offer->expected_error), percent(root(way.candidate.bias_square.value)),
                         traces_paths(way.method) && way.family == "path" ? "none by definition"
-                        : way.tried()                                    ? "table and pilot"
+                        : way.tried                                    ? "table and pilot"
                                                                          : "table",
                         percent(root(way.candidate.noise_square.value / plan.offer->spp)));
     text += fmt::format("cost      {}: {} to build, {} per picture; the plan took {}\n",

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace heddle {
 namespace {
@@ -11,7 +12,7 @@ namespace {
 // tolerance, at a high price; less would miss it.
 constexpr double kCaution = 0.25;
 // Share of the squared tolerance that is aimed at: the noise of a picture is itself uncertain.
-constexpr double kAim = 0.92;
+constexpr double kAim = 0.89;
 
 // Standard errors less at best: finding out more costs little beside what it may save.
 constexpr double kOptimism = 0.7;
@@ -21,8 +22,11 @@ constexpr double kDoubt = 2;
 constexpr double kMoreCaution = 1;
 constexpr double kRoomKept = 0.88;
 
-// What is known may cost so much more than what is not.
+// What is known, or errs less apart from noise, may cost so much more: what is not known may be worse than thought, and noise alone can be
+// mended.
 constexpr double kLittleMore = 1.25;
+// Squared errors that differ by this share of the squared tolerance are alike.
+constexpr double kLittleBias = 0.02;
 // Of a pilot of few of the picture's pixels, relative: a few pixels hold most of the squares, and it misses more of them than it meets.
 constexpr double kPilotError = 0.4;
 
@@ -90,17 +94,27 @@ std::optional<std::size_t> cheapest(std::span<const Candidate> candidates, doubl
 
 std::optional<std::size_t> cheapest_known(std::span<const Candidate> candidates, const std::vector<bool>& known,
                                           double tolerance, int pictures) {
-  const std::optional<std::size_t> any = cheapest(candidates, tolerance, pictures);
-  if (!any) return {};
-  std::size_t best = *any;
-  double seconds = kLittleMore * offer(candidates[best], tolerance, pictures)->seconds;
+  const std::optional<std::size_t> cheapest_of_all = cheapest(candidates, tolerance, pictures);
+  if (!cheapest_of_all) return {};
+  const double most_seconds = kLittleMore * offer(candidates[*cheapest_of_all], tolerance, pictures)->seconds;
+  std::vector<std::size_t> rivals;
+  bool any_known = false;
   for (std::size_t k = 0; k < candidates.size(); ++k) {
-    const std::optional<Offer> made = known[k] ? offer(candidates[k], tolerance, pictures) : std::nullopt;
-    if (!made || made->seconds > seconds) continue;
-    best = k;
-    seconds = made->seconds;
+    const std::optional<Offer> made = offer(candidates[k], tolerance, pictures);
+    if (!made || made->seconds > most_seconds) continue;
+    rivals.push_back(k);
+    any_known = any_known || known[k];
   }
-  return best;
+  if (any_known) std::erase_if(rivals, [&](std::size_t k) { return !known[k]; });
+  const auto bias = [&](std::size_t k) { return cautious(candidates[k].bias_square, kMoreCaution); };
+  const double least = bias(
+      *std::min_element(rivals.begin(), rivals.end(), [&](std::size_t a, std::size_t b) { return bias(a) < bias(b); }));
+  std::erase_if(rivals, [&](std::size_t k) { return bias(k) > least + kLittleBias * tolerance * tolerance; });
+  const auto rank = [&](std::size_t k) {
+    return std::pair(candidates[k].changes, offer(candidates[k], tolerance, pictures)->seconds);
+  };
+  return *std::min_element(rivals.begin(), rivals.end(),
+                           [&](std::size_t a, std::size_t b) { return rank(a) < rank(b); });
 }
 
 double best_tolerance(std::span<const Candidate> candidates) {
@@ -125,6 +139,14 @@ Estimate weighed(Estimate thought, Estimate measured, double unseen) {
   thought.error = std::max(thought.error, kTableError * square);
   measured.error = std::hypot(measured.error, kPilotError * std::sqrt(unseen) * square);
   return combined(thought, measured);
+}
+
+Estimate alike(const Estimate& thought, const Estimate& like_thought, const Estimate& like_seen) {
+  const double value = like_seen.value >= like_thought.value
+                           ? thought.value + like_seen.value - like_thought.value
+                           : thought.value * std::max(0.0, like_seen.value) / like_thought.value;
+  return {value, std::min(std::hypot(like_seen.error, kTableError * (thought.value - like_thought.value)),
+                          std::hypot(thought.error, kTableError * (value - thought.value)))};
 }
 
 Estimate combined(const Estimate& a, const Estimate& b) {

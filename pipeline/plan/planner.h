@@ -26,6 +26,7 @@ struct Candidate {
   double setup_seconds = 0;    // of every picture
   double seconds_per_spp = 0;  // of every picture
   int spp_step = 1;            // samples come in multiples of this
+  int changes = 0;             // settings that are not the fabrics' own
 };
 
 /// What a candidate takes to meet a tolerance.
@@ -54,7 +55,9 @@ int more_samples(const Candidate& candidate, const Estimate& noise_square, int d
 /// The cheapest of those that meet the tolerance; nothing where none does.
 std::optional<std::size_t> cheapest(std::span<const Candidate> candidates, double tolerance, int pictures);
 
-/// The same, but one of those that are known (by a pilot of their own) where it costs little more: finding out costs, too.
+/// Of those that cost little more, too: one that is known (by a pilot of its own) if there is one, since finding out costs; and of these the
+/// one that errs least apart from noise, and of those that err alike the one with the fewest changes: what each of them does here is
+/// known least.
 std::optional<std::size_t> cheapest_known(std::span<const Candidate> candidates, const std::vector<bool>& known,
                                           double tolerance, int pictures);
 
@@ -63,6 +66,10 @@ double best_tolerance(std::span<const Candidate> candidates);
 
 /// A squared error with caution on the other side: what it may well be, at best.
 Estimate at_best(const Estimate& square);
+
+/// What a way errs by, of which only `thought` is known, if of a like one `like_thought` was and `like_seen` is now: worse by as much, or
+/// better by the same factor.
+Estimate alike(const Estimate& thought, const Estimate& like_thought, const Estimate& like_seen);
 
 /// Two independent estimates of one quantity.
 Estimate combined(const Estimate& a, const Estimate& b);

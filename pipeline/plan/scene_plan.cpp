@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "pipeline/picture_request.h"
+#include "pipeline/plan/enclosure.h"
 #include "pipeline/plan/measure_accuracy.h"
 #include "pipeline/plan/probe.h"
 #include "pipeline/scene_needs.h"
@@ -20,7 +21,7 @@ namespace fs = std::filesystem;
 // The pilot's pixels come in blocks of this edge: neighbours share cache lines, and blocks tell how much the picture varies.
 constexpr int kBlockEdge = 8;
 // Of the first pilot; less of a small picture.
-constexpr int kFirstPixels = 1024;
+constexpr int kFirstPixels = 2048;
 constexpr int kPilotSamples = 2;
 // A pilot of the chosen way may take this share of its pictures' time if its noise is not known well enough before.
 constexpr double kPilotShare = 0.08;
@@ -37,6 +38,22 @@ constexpr double kDoubtShare = 0.25;
 constexpr double kBuildShare = 0.25;
 // Light from one cloth to another is known well enough if its squared error is this share of the squared tolerance, or less.
 constexpr double kBetweenKnown = 0.05;
+// Light between cloths by what they see of each other, relative to the folds of a table: long valleys give each other more than what
+// drapes and things side by side do. One standard error of it.
+constexpr double kBetweenOfFolds = 0.6;
+constexpr double kBetweenError = 0.6;
+// Of the mean that a fast way makes of the picture, relative, beside what is thought of it.
+constexpr double kMeanError = 0.07;
+// A pilot tells nothing if its standard error is more than this many of what is known, and enough if it is less than the second.
+constexpr double kTelling = 0.8;
+constexpr double kTold = 0.6;
+// Standard errors added to a pilot's squared error where it says less than was thought: it misses rare large squares more often than it
+// meets them.
+constexpr double kDoubtOfLess = 0.7;
+// A pilot of all pixels has not seen all that their samples may show.
+constexpr double kLeastUnseen = 0.25;
+// Squared errors are corrected by this factor at most.
+constexpr double kMostStress = 4;
 // The pilot's random numbers are not those of the picture.
 constexpr std::uint64_t kPilotSeed = 0x9107;
 // Fabrics of one scene whose settings are chosen apart: there are up to 6 choices for each.
@@ -136,7 +153,8 @@ class ScenePlanner {
     path_seconds_per_spp_ = seconds_per_spp(crops, spp);
     path_variance_ = sample_variance(paths_);
     local_paths_ = {};
-    mean_ = {mean_radiance(paths_), std::sqrt(path_variance_.value / (pilot_pixels_ * spp))};
+    path_mean_ = {mean_radiance(paths_), std::sqrt(path_variance_.value / (pilot_pixels_ * spp))};
+    mean_ = path_mean_;
   }
 
   /// Can light that has left a cloth meet cloth again?
@@ -152,15 +170,38 @@ class ScenePlanner {
     PictureRequest local = pilot_request(RenderMethod::kPath, path_spp_);
     local.local = true;
     local_paths_ = shoot(*job_, local).frames;
-    light_between_ = relative(squared_bias_of_means(local_paths_, paths_));
     light_between_mean_ = mean_.value > 0 ? mean_radiance(local_paths_) / mean_.value - 1 : 0;
+    light_between_ = relative(squared_bias_of_means(local_paths_, paths_));
+    // The mean's part of it is known best.
+    light_between_.value = std::max(light_between_.value, light_between_mean_ * light_between_mean_);
+    if (const Estimate thought = thought_between(); thought.value > 0) {
+      // Few of the paths carry it, and few paths may have met none of those.
+      const double noise = mean_.value > 0 ? mean_.error / mean_.value : 1;
+      const double square = std::max(thought.value, light_between_.value);
+      light_between_.error = std::max(light_between_.error, 2 * noise * std::sqrt(square));
+      light_between_ = combined(thought, light_between_);
+    }
+  }
+  /// Light between cloths by what they see of each other, as in the folds of the fabrics' tables.
+  Estimate thought_between() const {
+    double square = 0;
+    for (std::size_t k = 0; k < plan_.scene.cloths.size(); ++k) {
+      if (!is_seen_fibers(k)) continue;
+      const AccuracyTable& table = *fabric_of(plan_.scene.cloths[k].fabric)->table;
+      if (!(table.bent_enclosure_square > 0)) continue;
+      double of_folds = 0;
+      for (const LightShare& light : lights_of_cloth_[k]) of_folds += light.weight * table.between_at(light.sharpness);
+      square += weight_of(k) * kBetweenOfFolds * of_folds * enclosure_square_[k] / table.bent_enclosure_square;
+    }
+    return {square, kBetweenError * square};
   }
   static bool lacks_light_between(const Way& way) {
     return !traces_paths(way.method) || !way.variant.stand_ins.empty();
   }
 
-  /// The error of a way: from that against what it claims to compute and from what it does not claim; and as its own pilot saw it.
-  void add_up(Way& way) const {
+  /// The error of a way by the tables and by light between cloths: from that against what it claims to compute and from what it does not
+  /// claim.
+  Estimate thought_of(const Way& way) const {
     Estimate thought = way.bias_square;
     if (lacks_light_between(way)) {
       // Where both darken, they add up.
@@ -168,10 +209,34 @@ class ScenePlanner {
       thought.value += std::max(0.0, light_between_.value) + together;
       thought.error = std::hypot(thought.error, light_between_.error);
     }
-    way.candidate.bias_square = thought;
-    if (!way.pilot) return;
-    const Estimate both = weighed(thought, way.pilot->bias_square, way.pilot->unseen);
-    if (both.value > thought.value || way.pilot->may_lower) way.candidate.bias_square = both;
+    return thought;
+  }
+
+  /// The same, and as a pilot saw it.
+  Estimate seen_of(const Way& way) const {
+    const Estimate thought = thought_of(way);
+    const Estimate& measured = way.pilot->bias_square;
+    const Estimate raised = weighed(thought, measured, way.pilot->unseen);
+    if (raised.value > thought.value) return raised;
+    if (!way.pilot->may_lower) return thought;
+    const double error = std::max(measured.error, -measured.value);
+    const Estimate doubted{std::max(0.0, measured.value) + kDoubtOfLess * error, error};
+    const Estimate lowered = weighed(thought, doubted, way.pilot->unseen);
+    return lowered.value < thought.value ? lowered : thought;
+  }
+
+  /// All errors, from all that is known. What a pilot finds of a way holds of its kind.
+  void add_up() {
+    for (Way& way : plan_.ways) {
+      const Estimate thought = thought_of(way);
+      const auto of_kind = piloted_.find(way.kind());
+      if (of_kind == piloted_.end()) {
+        way.candidate.bias_square = thought;
+        continue;
+      }
+      const Way& like = plan_.ways[of_kind->second];
+      way.candidate.bias_square = &like == &way ? seen_of(way) : alike(thought, thought_of(like), seen_of(like));
+    }
   }
 
   /// An absolute square relative to the mean radiance; the mean's own error counts.
@@ -188,6 +253,7 @@ class ScenePlanner {
     plan_.seen.resize(scene.cloths.size());
     lights_of_cloth_.resize(scene.cloths.size());
     pixel_lights_.resize(scene.cloths.size());
+    enclosure_square_.resize(scene.cloths.size());
     lights_ = fit_environments(scene.lights).lights;
     std::vector<std::size_t> cloth_of_fibers;
     for (std::size_t k = 0; k < scene.cloths.size(); ++k) {
@@ -210,6 +276,8 @@ class ScenePlanner {
         seen.share += 1;
         seen.light_share += light;
         seen.footprint_mm += std::log(ray.spread * hit->t);
+        const double enclosed = sends_light_about() ? enclosure(fibers, *hit, ray.direction) : 0;
+        enclosure_square_[cloth] += enclosed * enclosed;
         PixelLight& on_pixel = pixel_lights_[cloth].emplace_back();
         const bool sees_face = fibers.fabric_direction(*hit, -ray.direction).z() > 0;
         for (std::size_t l = 0; l < lights_.size(); ++l) {
@@ -228,6 +296,7 @@ class ScenePlanner {
       SeenCloth& seen = plan_.seen[cloth];
       if (!(seen.share > 0)) continue;
       seen.footprint_mm = std::exp(seen.footprint_mm / seen.share);
+      enclosure_square_[cloth] /= seen.share;
       double all = 0;
       for (std::size_t l = 0; l < lights_.size(); ++l) {
         // Soft light comes from beside its axis too.
@@ -242,6 +311,12 @@ class ScenePlanner {
       seen.share /= pilot_pixels_;
       seen.light_share = all_light > 0 ? seen.light_share / all_light : 0;
     }
+  }
+
+  /// A cloth's light, squared, relative to the picture's: (light_share / share)^2, on `share` of the pixels.
+  double weight_of(std::size_t cloth) const {
+    const SeenCloth& seen = plan_.seen[cloth];
+    return seen.light_share * seen.light_share / seen.share;
   }
 
   bool is_seen_fibers(std::size_t cloth) const {
@@ -314,6 +389,7 @@ class ScenePlanner {
   void add_path() {
     Way way;
     way.family = "path";
+    way.tried = true;
     way.method = RenderMethod::kPath;
     way.candidate = {.name = "path",
                      .bias_square = {},
@@ -434,9 +510,15 @@ class ScenePlanner {
     Rgbd flat_ratio;
     Rgbd folds_ratio;
     double rest_square;
-    void change(const Parts& to, const Parts& from, bool in_folds) {
-      (in_folds ? folds_ratio : flat_ratio) *= to.flat_ratio / from.flat_ratio.max(1e-3);
+    void add(const Parts& to, const Parts& from) {
+      folds_ratio *= to.flat_ratio / from.flat_ratio.max(1e-3);
       rest_square += to.rest_square - from.rest_square;
+    }
+    /// What a setting changes is known without the noise of path tracing, but not whether it makes good or worse what errs already: worse by
+    /// half of it at least, or of many settings that which merely looks better is chosen.
+    void change(const Parts& to, const Parts& from, double change_square, bool in_folds) {
+      (in_folds ? folds_ratio : flat_ratio) *= to.flat_ratio / from.flat_ratio.max(1e-3);
+      rest_square += std::max(to.rest_square - from.rest_square, 0.5 * change_square);
     }
   };
   static Parts parts_of(const AccuracyTable& table, const Accuracy& entry) {
@@ -478,14 +560,15 @@ class ScenePlanner {
             is_bent && bent[0].bias_square - bent[1].bias_square > flat[0].bias_square - flat[1].bias_square;
         const Accuracy* of_cloth = more_in_folds ? bent : flat;
         unsure = std::max(unsure, of_cloth->bias_square_error);
-        parts.change(parts_of(table, of_cloth[0]), parts_of(table, of_cloth[1]), more_in_folds);
+        parts.change(parts_of(table, of_cloth[0]), parts_of(table, of_cloth[1]), of_cloth->change_square,
+                     more_in_folds);
       }
       // What folds add to a flat swatch seen from as far.
       if (is_bent) {
         const Accuracy flat =
             table.at(settings.base, light.sharpness, table.bent_footprint_mm, table.bent_light_cosine);
         const Accuracy bent = folded(settings.base);
-        if (bent.bias_square > flat.bias_square) parts.change(parts_of(table, bent), parts_of(table, flat), true);
+        if (bent.bias_square > flat.bias_square) parts.add(parts_of(table, bent), parts_of(table, flat));
         // Other folds show other pairs of view and light, but many of them.
         unsure = bent.bias_square_error;
       }
@@ -541,6 +624,7 @@ class ScenePlanner {
     Candidate& candidate = way.candidate;
     candidate.name = name_of(way);
     candidate.spp_step = traces_paths(method) ? 2 : 1;
+    candidate.changes = changes_of(way);
     double noise = 0;
     double noise_weight = 0;
     double time = 0;
@@ -559,8 +643,7 @@ class ScenePlanner {
         if (is_precomputed(method) && !fabric.light_from_both_sides)
           add_light_from_behind(k, fabric.table->through, answer);
       }
-      // The cloth's light, squared, relative to the picture's: (light_share / share)^2, on `share` of the pixels.
-      const double weight = of.light_share * of.light_share / of.share;
+      const double weight = weight_of(k);
       way.bias_square.value += weight * answer.bias_square.value;
       way.mean_error += of.light_share * answer.mean_error;
       way.bias_square.error += weight * answer.bias_square.error;
@@ -577,7 +660,7 @@ class ScenePlanner {
     candidate.noise_square = {noise_ratio * traced.value, noise_ratio * std::hypot(traced.error, 0.2 * traced.value)};
     candidate.seconds_per_spp = path_seconds_per_spp_ * (seen > 0 ? time / seen : 1);
     candidate.build_seconds = build_seconds(way);
-    add_up(way);
+    way.candidate.bias_square = thought_of(way);
     plan_.ways.push_back(std::move(way));
   }
 
@@ -621,6 +704,19 @@ class ScenePlanner {
     return seconds;
   }
 
+  int changes_of(const Way& way) const {
+    int changes = static_cast<int>(way.variant.stand_ins.size());
+    if (!is_precomputed(way.method)) return changes;
+    if (way.variant.blend != VisibilityBlend{}) ++changes;
+    for (const auto& fabric : fabrics_) {
+      if (!draws_fibers(way, fabric->file)) continue;
+      const SceneVariant::OfFabric of = way.variant.of(fabric->file);
+      changes += static_cast<int>(of.order.has_value()) + static_cast<int>(of.variant.cell_size != 1) +
+                 static_cast<int>(of.variant.voxel_rate != 1);
+    }
+    return changes;
+  }
+
   std::string name_of(const Way& way) const {
     std::string name = render_method_name(way.method);
     if (is_precomputed(way.method)) {
@@ -651,7 +747,7 @@ class ScenePlanner {
 
   std::vector<bool> tried() const {
     std::vector<bool> list;
-    for (const Way& way : plan_.ways) list.push_back(way.tried());
+    for (const Way& way : plan_.ways) list.push_back(way.tried);
     return list;
   }
 
@@ -686,18 +782,16 @@ class ScenePlanner {
   bool hope(const Offer& offered) {
     std::vector<Candidate> list = candidates();
     for (Candidate& candidate : list) candidate.bias_square = at_best(candidate.bias_square);
-    const std::optional<std::size_t> best = cheapest(list, plan_.question.tolerance, plan_.question.pictures);
+    const std::optional<std::size_t> best =
+        cheapest_known(list, std::vector<bool>(list.size()), plan_.question.tolerance, plan_.question.pictures);
     if (!best || *best == *plan_.chosen) return false;
     const Offer hoped = *offer(list[*best], plan_.question.tolerance, plan_.question.pictures);
     if (hoped.seconds > kHope * offered.seconds) return false;
-    Way& way = plan_.ways[*best];
-    if (!way.pilot || way.pilot->samples < pilot_samples()) {
-      const double affordable = kBuildShare * (offered.seconds - hoped.seconds);
-      if (way.candidate.build_seconds + seconds_to_try(way) > affordable || !may_try(way)) return false;
-      try_out(way, true);
-      return true;
-    }
-    return more_paths(kPilotShare * offered.seconds);
+    // What the chosen way's own pilot says holds of its kind.
+    Way& way = plan_.ways[plan_.ways[*best].kind() == plan_.ways[*plan_.chosen].kind() ? *plan_.chosen : *best];
+    const double affordable = kBuildShare * (offered.seconds - hoped.seconds);
+    if (!may_try(way) || way.candidate.build_seconds + seconds_to_try(way) > affordable) return false;
+    return find_out(way, kPilotShare * offered.seconds, true);
   }
 
   /// Finds out more of the way that looks cheapest; false where there is nothing to find out.
@@ -705,17 +799,47 @@ class ScenePlanner {
     if (way.family == "path") {
       // A picture finds out itself how many samples it needs: only the choice depends on its noise here.
       const double error = way.candidate.noise_square.error / way.candidate.noise_square.value;
-      return error >= kNoiseKnown && has_rival(offered) && more_paths(kPilotShare * offered.seconds);
+      return error >= kNoiseKnown && has_rival(offered) &&
+             more_paths(4 * pilot_samples(), kPilotShare * offered.seconds);
     }
-    if (lacks_light_between(way) && know_light_between(offered)) return true;
-    if (!may_try(way)) return false;
-    const bool in_doubt = may_miss(way.candidate, plan_.question.tolerance);
-    if (!way.pilot || (in_doubt && way.pilot->samples < pilot_samples())) {
-      if (seconds_to_try(way) > (in_doubt ? kDoubtShare : kTryShare) * offered.seconds) return false;
-      try_out(way, false);
+    if (!way.tried && may_try(way) && seconds_to_try(way) <= kTryShare * offered.seconds) {
+      try_out(way, false);  // for its noise and its speed here
       return true;
     }
-    return in_doubt && more_paths(kDoubtShare * offered.seconds);
+    if (between_matters(way) && know_light_between(offered)) return true;
+    if (!may_try(way) || !way.tried) return false;
+    const double affordable = kDoubtShare * offered.seconds;
+    return may_miss(way.candidate, plan_.question.tolerance) && seconds_to_try(way) <= affordable &&
+           find_out(way, affordable, false);
+  }
+
+  /// Tries a way against the paths that there are, if that tells more of its error than is known and has not been done to one of its kind;
+  /// else a larger pilot of paths, if one that tells enough is affordable. False where neither is.
+  bool find_out(Way& way, double affordable, bool hoped_for) {
+    const double known = way.candidate.bias_square.error;
+    const auto of_kind = piloted_.find(way.kind());
+    const bool is_new = of_kind == piloted_.end() || plan_.ways[of_kind->second].pilot->samples < pilot_samples();
+    if (is_new && pilot_error(pilot_samples()) <= kTelling * known) {
+      try_out(way, hoped_for);
+      return true;
+    }
+    double wanted = 2 * pilot_samples();
+    while (pilot_error(wanted) > kTold * known && wanted < pixels_ * kMostSamples) wanted *= 1.3;
+    const bool between_too = between_matters(way);
+    if (between_too) affordable /= 2;
+    wanted = std::min(wanted, affordable / seconds_per_path());
+    if (pilot_error(wanted) > kTelling * known || !more_paths(wanted, affordable)) return false;
+    if (between_too) {
+      trace_local();
+      add_up();
+    }
+    return true;
+  }
+
+  /// Standard error of the squared error that pilots of so many paths, and of a way in about the same time, say.
+  double pilot_error(double samples) const {
+    const double pixels = std::min(pixels_, samples / kPilotSamples);
+    return 2.5 * plan_.ways[0].candidate.noise_square.value / (samples / pixels * std::sqrt(pixels));
   }
 
   /// Does another way not cost much more?
@@ -731,9 +855,9 @@ class ScenePlanner {
   double pilot_samples() const { return pilot_pixels_ * path_spp_; }
   double seconds_per_path() const { return path_seconds_per_spp_ / pixels_; }
 
-  /// A larger pilot of paths in the seconds affordable; false where it would not be much larger. Four times the samples are twice as sure.
-  bool more_paths(double affordable) {
-    const double wanted = std::min(affordable / seconds_per_path(), 4 * pilot_samples());
+  /// A larger pilot of paths, in the seconds affordable; false where it would not be much larger. Four times the samples are twice as sure.
+  bool more_paths(double wanted, double affordable) {
+    wanted = std::min(wanted, affordable / seconds_per_path());
     if (wanted < 2 * pilot_samples()) return false;
     trace_pilot_of(wanted);
     return true;
@@ -753,14 +877,19 @@ class ScenePlanner {
     return way.candidate.setup_seconds + samples_to_try(way) * pilot_pixels_ / pixels_ * way.candidate.seconds_per_spp;
   }
 
+  /// Is light between cloths what is known least of the way's error?
+  bool between_matters(const Way& way) const {
+    return lacks_light_between(way) && light_between_.error > way.bias_square.error;
+  }
+
   /// Another pilot, if light between cloths decides what is offered and is not known; false if not.
   bool know_light_between(const Offer& offered) {
     const double tolerance = plan_.question.tolerance;
     if (light_between_.error < kBetweenKnown * tolerance * tolerance) return false;
     // Both pictures of paths count.
-    if (!more_paths(kPilotShare * offered.seconds / 2)) return false;
+    if (!more_paths(4 * pilot_samples(), kPilotShare * offered.seconds / 2)) return false;
     trace_local();
-    for (Way& way : plan_.ways) add_up(way);
+    add_up();
     return true;
   }
 
@@ -777,6 +906,8 @@ class ScenePlanner {
     SceneJob& job = way.variant == SceneVariant{} ? *job_ : *other_job_;
     const int samples = samples_to_try(way);
     const SceneJob::Crops crops = shoot(job, pilot_request(way.method, samples));
+    refine_mean(way, mean_radiance(crops.frames));
+    if (is_precomputed(way.method)) measure_stress();
     const Candidate before = way.candidate;
     Candidate& now = way.candidate;
     now.noise_square = relative(sample_variance(crops.frames));
@@ -788,23 +919,86 @@ class ScenePlanner {
     const double noise =
         2 * (plan_.ways[0].candidate.noise_square.value / path_spp_ + now.noise_square.value / samples);
     measured.error = std::max(measured.error, noise / std::sqrt(pilot_pixels_));
-    way.pilot = {measured, pilot_samples(), std::max(0.0, 1 - pilot_pixels_ / pixels_),
-                 hoped_for || (way.pilot && way.pilot->may_lower)};
-    add_up(way);
+    bool may_lower = hoped_for;
+    const auto index = static_cast<std::size_t>(&way - plan_.ways.data());
+    const auto [of_kind, is_first] = piloted_.try_emplace(way.kind(), index);
+    if (!is_first) {
+      may_lower = may_lower || plan_.ways[of_kind->second].pilot->may_lower;
+      plan_.ways[of_kind->second].pilot.reset();
+      of_kind->second = index;
+    }
+    way.pilot = {measured, pilot_samples(), std::max(kLeastUnseen, 1 - pilot_pixels_ / pixels_), may_lower};
     // What differs from the table here does so for the like of it too.
     const double noise_ratio = now.noise_square.value / before.noise_square.value;
     const double time_ratio = now.seconds_per_spp / before.seconds_per_spp;
-    const double more_bias = now.bias_square.value - before.bias_square.value;
     for (Way& other : plan_.ways) {
-      if (other.tried() || other.family != way.family) continue;
+      if (other.kind() != way.kind()) continue;
+      other.tried = true;
+      if (&other == &way) continue;
       Candidate& like = other.candidate;
       like.noise_square = {like.noise_square.value * noise_ratio,
                            like.noise_square.value * now.noise_square.error / now.noise_square.value};
       like.seconds_per_spp *= time_ratio;
       like.setup_seconds = now.setup_seconds;
-      other.bias_square.value = std::max(0.0, other.bias_square.value + more_bias);
-      add_up(other);
       like.build_seconds = build_seconds(other);
+    }
+    add_up();
+  }
+
+  /// The picture's mean, which few paths tell badly, by what a way that has hardly any noise makes of it. All that is relative to it
+  /// follows.
+  void refine_mean(const Way& way, double mean) {
+    if (!(mean > 0) || !(mean_.value > 0)) return;
+    const double missing = way.mean_error + (lacks_light_between(way) ? std::min(0.0, light_between_mean_) : 0);
+    const double before = mean_.value;
+    mean_ = combined(path_mean_, {mean, mean * std::hypot(kMeanError, missing)});
+    const double scale = before * before / (mean_.value * mean_.value);
+    for (Way& other : plan_.ways) {
+      other.candidate.noise_square.value *= scale;
+      other.candidate.noise_square.error *= scale;
+    }
+  }
+
+  /// Where this view and these lights make much of the higher harmonics, other errors of flat cloth are large, too: light that hardly
+  /// any of the cloth sends here is hard to get right. Two pictures by the fabrics' own data that share all else tell it, next to free of
+  /// noise.
+  void measure_stress() {
+    constexpr int kLowOrder = kOtherOrders[0];
+    const auto own = std::find_if(plan_.ways.begin(), plan_.ways.end(), [this](const Way& way) {
+      return way.method == RenderMethod::kExact && way.variant.blend == VisibilityBlend{} &&
+             way.variant.stand_ins.empty() && std::all_of(fabrics_.begin(), fabrics_.end(), [&](const auto& fabric) {
+               return way.variant.of(fabric->file) == SceneVariant::OfFabric{};
+             });
+    });
+    if (stress_ || own == plan_.ways.end() || own->candidate.build_seconds > 0) return;
+    double thought = 0;
+    for (std::size_t k = 0; k < plan_.scene.cloths.size(); ++k) {
+      if (!is_seen_fibers(k)) continue;
+      const Fabric& fabric = *fabric_of(plan_.scene.cloths[k].fabric);
+      if (plan_.scene.cloths[k].mesh || fabric.order <= kLowOrder) return;
+      double together = 0;
+      double apart = 0;
+      for (const LightShare& light : lights_of_cloth_[k]) {
+        const double square =
+            fabric.table->at(order_setting(kLowOrder), light.sharpness, plan_.seen[k].footprint_mm, light.cosine)
+                .change_square;
+        together += light.weight * std::sqrt(std::max(0.0, square));
+        apart += light.weight * light.weight * square;
+      }
+      thought += weight_of(k) * 0.5 * (together * together + apart);
+    }
+    const PictureRequest request = pilot_request(RenderMethod::kExact, 2);
+    const SceneJob::Crops whole = shoot(*job_, request);
+    const Stopwatch watch;
+    const SceneJob::Crops low = job_->render_crops(request, blocks_, kLowOrder);
+    loading_ = loading_ + (watch.elapsed() - low.setup - low.rendering);
+    const double mean = mean_radiance(whole.frames);
+    const double change = mean > 0 ? squared_bias(low.frames, whole.frames).value / (mean * mean) : 0;
+    stress_ = thought > 0 && change > 0 ? std::clamp(std::sqrt(change / thought), 1.0, kMostStress) : 1;
+    for (Way& way : plan_.ways) {
+      if (!is_precomputed(way.method) || !way.variant.stand_ins.empty()) continue;
+      way.bias_square.value *= *stress_;
+      way.bias_square.error = std::max(way.bias_square.error, kTableError * way.bias_square.value);
     }
   }
 
@@ -818,20 +1012,25 @@ class ScenePlanner {
   std::vector<Light> lights_;                             // environments as Gaussians
   std::vector<std::vector<LightShare>> lights_of_cloth_;  // [cloth][light]
   std::vector<std::vector<PixelLight>> pixel_lights_;     // [cloth][pixel of the first pilot on it]
+  std::vector<double> enclosure_square_;                  // [cloth] mean over the pixels of the first pilot on it
   std::vector<std::unique_ptr<Fabric>> fabrics_;
   std::map<std::pair<fs::path, std::string>, AccuracyTable> surfaces_;
 
   std::vector<PixelRect> blocks_;
-  std::vector<FrameBuffers> paths_;        // [block]
-  std::vector<FrameBuffers> local_paths_;  // [block] the same, local; empty until asked for, or where all are
-  Estimate light_between_;                 // squared, of what is not local
-  double light_between_mean_ = 0;          // of the picture's mean without it
+  std::vector<FrameBuffers> paths_;             // [block]
+  std::vector<FrameBuffers> local_paths_;       // [block] the same, local; empty until asked for, or where all are
+  Estimate light_between_;                      // squared, of what is not local
+  double light_between_mean_ = 0;               // of the picture's mean without it
+  std::map<std::string, std::size_t> piloted_;  // [kind of ways] the way that has its pilot
+  std::optional<double>
+      stress_;  // squared errors of flat cloth, relative to the table's; known once a precomputed way is tried
   double pilot_pixels_ = 0;
   int path_spp_ = 0;
   double path_setup_ = 0;
   double path_seconds_per_spp_ = 0;
   Estimate path_variance_;  // absolute
-  Estimate mean_;           // radiance
+  Estimate path_mean_;      // radiance, by the pilot of paths
+  Estimate mean_;           // the same, by all that is known
 };
 
 }  // namespace

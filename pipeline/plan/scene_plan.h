@@ -8,8 +8,10 @@
 //                                  what their data take to build
 //   the cache                      which data are there already
 //   more pilots                    of the way that looks cheapest, where its data are there or may be built
-//   light between cloths           (and between slopes of one): paths of the pilot with and without what they meet beyond the cloth
-//                                  that they leave; all of it is missing from dual scattering and the precomputed methods
+//   light between cloths           (and between slopes of one), which is missing from dual scattering and the precomputed methods: what
+//                                  they see of each other (enclosure.h), and paths of the pilot with and without what they meet
+//                                  beyond the cloth that they leave
+//   two orders of the transfer     of a flat scene: how much this view and these lights ask of it
 //
 // Ways: path tracing, 6 scattering events of it, dual scattering; and the precomputed methods with, for each fabric, the size of
 // its cells and the order of its transfer, voxels, and the form of visibility of the Gaussian lights; each also with the farthest
@@ -57,14 +59,20 @@ struct Way {
     // otherwise.
     bool may_lower;
   };
-  std::optional<Pilot> pilot = {};
-  /// Its noise and speed are this view's own, by a pilot; the pilot of paths is the first.
-  bool tried() const { return family == "path" || pilot.has_value(); }
+  std::optional<Pilot> pilot = {};  // of one of its kind at most
+  bool tried = false;               // it or one of its kind: noise and speed are this view's own
+  std::string kind() const;
 };
 
 /// Renders fibers from precomputed data, as the paper's methods do.
 inline bool is_precomputed(RenderMethod method) {
   return method == RenderMethod::kExact || method == RenderMethod::kVolume;
+}
+
+/// Ways that share their errors, noise and speed up to what tables tell apart: what a pilot finds of one holds of all.
+inline std::string Way::kind() const {
+  if (!is_precomputed(method)) return family;
+  return variant.stand_ins.empty() ? "precomputed" : "precomputed + surfaces";
 }
 
 /// What the pilot saw of one cloth of the scene.

@@ -9,12 +9,14 @@
 
 #include "formats/input_error.h"
 #include "pipeline/plan/accuracy_table.h"
+#include "pipeline/plan/enclosure.h"
 #include "pipeline/plan/measure_accuracy.h"
 #include "pipeline/plan/planner.h"
 #include "pipeline/plan/probe.h"
 #include "pipeline/stages.h"
 #include "render/pixel_sums.h"
 #include "tests/pipeline/small_fabric.h"
+#include "tests/support/small_exemplars.h"
 #include "tests/support/temporary_folder.h"
 
 namespace heddle {
@@ -72,10 +74,10 @@ TEST(Plan, MoreCautionWhereItCostsLittle) {
     unsure.bias_square.error = 0.5 * bias_square;
     return static_cast<double>(offer(unsure, 0.2, 1)->spp) / sure;
   };
-  EXPECT_GT(samples_more(0.1 * 0.04), 1 + 0.9 * 0.5 * 0.1 / (0.92 - 0.1)) << "a whole standard error, or nearly";
+  EXPECT_GT(samples_more(0.1 * 0.04), 1 + 0.9 * 0.5 * 0.1 / (0.89 - 0.1)) << "a whole standard error, or nearly";
   EXPECT_GT(samples_more(0.6 * 0.04), 1.1);
   Candidate near = kCandidates[1];
-  near.bias_square = {0.8 * 0.04, 0.3 * 0.04};
+  near.bias_square = {0.77 * 0.04, 0.3 * 0.04};
   EXPECT_TRUE(offer(near, 0.2, 1)) << "not turned away for what it may be at worst";
   EXPECT_TRUE(may_miss(near, 0.2));
   EXPECT_FALSE(may_miss(near, 0.3));
@@ -105,7 +107,7 @@ TEST(Plan, PicturesGoOnUntilTheirOwnNoiseIsSmallEnough) {
       EXPECT_EQ(more % of.spp_step, 0);
     }
     EXPECT_LE(std::sqrt(of.bias_square.value + noise.value / spp), tolerance) << of.name;
-    EXPECT_GT(std::sqrt(of.bias_square.value + noise.value / (0.7 * spp)), tolerance) << of.name;
+    EXPECT_GT(std::sqrt(of.bias_square.value + noise.value / (0.6 * spp)), tolerance) << of.name;
     EXPECT_EQ(more_samples(of, {0.1 * of.noise_square.value, 0}, spp, tolerance), 0);
     EXPECT_GT(more_samples(of, {noise.value, 10 * noise.value}, spp, tolerance), 0) << "noise hardly known";
   }
@@ -136,6 +138,21 @@ TEST(Plan, WhatIsKnownIsPreferredToWhatCostsLittleLess) {
   EXPECT_EQ(chosen(3, {true, true, true}), 2U);
   EXPECT_EQ(chosen(4, {true, true, true, false}), 3U);
   EXPECT_FALSE(cheapest_known(list, {true, true, true, true}, 1e-6, 1));
+}
+
+TEST(Plan, OfWhatCostsLittleMoreTheOneThatErrsLeast) {
+  const std::vector<Candidate> list = {candidate("cheap", 0.12, 1, 0, 0.01), candidate("better", 0.05, 1, 0, 0.0175),
+                                       candidate("best", 0, 1, 0, 0.05)};
+  const double cheapest_seconds = offer(list[0], 0.2, 1)->seconds;
+  ASSERT_GT(offer(list[1], 0.2, 1)->seconds, cheapest_seconds);
+  ASSERT_GT(offer(list[2], 0.2, 1)->seconds, 1.5 * cheapest_seconds);
+  EXPECT_EQ(cheapest_known(list, {true, true, true}, 0.2, 1), 1U);
+  EXPECT_EQ(cheapest_known(list, {true, false, false}, 0.2, 1), 0U) << "what is known goes first";
+  std::vector<Candidate> alike = {candidate("changed", 0.1, 1, 0, 0.01), candidate("own", 0.1, 1, 0, 0.0105)};
+  alike[0].changes = 2;
+  EXPECT_EQ(cheapest_known(alike, {true, true}, 0.2, 1), 1U);
+  alike[1].seconds_per_spp = 0.02;
+  EXPECT_EQ(cheapest_known(alike, {true, true}, 0.2, 1), 0U) << "that much cheaper";
 }
 
 TEST(Plan, TighterTolerancesNeverGetCheaper) {
@@ -331,6 +348,17 @@ TEST(ProbeStatistical, APictureKnowsHowWellItKnowsItsNoise) {
   EXPECT_NEAR(within / 40, 0.68, 4 * std::sqrt(0.68 * 0.32 / 40));
 }
 
+TEST(Plan, WhatIsSeenOfOneWayHoldsOfItsLike) {
+  const Estimate like_thought{0.2, 0.1};
+  // Worse than thought: so is the other, by as much. Better: by the same factor, so that no square turns negative.
+  EXPECT_NEAR(alike({0.3, 0.2}, like_thought, {0.5, 0.05}).value, 0.6, 1e-12);
+  EXPECT_NEAR(alike({0.3, 0.2}, like_thought, {0.05, 0.02}).value, 0.075, 1e-12);
+  EXPECT_EQ(alike({0.3, 0.2}, like_thought, {0, 0.02}).value, 0);
+  // As sure as the one that was seen, where both were thought to err alike; less sure where not.
+  EXPECT_NEAR(alike({0.2, 0.1}, like_thought, {0.25, 0.03}).error, 0.03, 1e-12);
+  EXPECT_GT(alike({0.4, 0.2}, like_thought, {0.25, 0.03}).error, 0.05);
+}
+
 AccuracyTable small_table() {
   AccuracyTable table;
   table.fabric = "cloth \"of\" gold";
@@ -339,9 +367,11 @@ AccuracyTable small_table() {
   table.sharpness = {10, 1000};
   table.footprint_mm = {0.1, 0.4};
   table.light_cosine = {0.5, 0.9};
-  const auto entry = [](double bias) { return Accuracy{bias, 0.01, 2 * bias, Rgbd(1, 0.9, 1.1)}; };
+  const auto entry = [](double bias) { return Accuracy{bias, 0.01, 2 * bias, 3 * bias, Rgbd(1, 0.9, 1.1)}; };
   table.bent_footprint_mm = 3;
   table.bent_light_cosine = 0.7;
+  table.bent_between = {0.2, 0.4};
+  table.bent_enclosure_square = 0.05;
   table.color = Rgbd(1.5, 1, 0.5);
   table.through = 0.25;
   // [light][footprint][height]: low light errs by 10 more.
@@ -363,6 +393,9 @@ TEST(AccuracyTable, BetweenEntriesInLogarithms) {
   EXPECT_NEAR(table.at("exact", 100, 0.2, 0.6).bias_square, 10, 1e-12) << "cosines themselves, not their logarithms";
   EXPECT_DOUBLE_EQ(table.at("exact", 0, 0.001, 1).bias_square, 1) << "the nearest entry beyond the ends";
   EXPECT_DOUBLE_EQ(table.at("exact", kDirectionalSharpness, 10, 0).bias_square, 14);
+  EXPECT_NEAR(table.at("exact", 100, 0.2, 0.9).change_square, 7.5, 1e-12);
+  EXPECT_NEAR(table.between_at(100), 0.3, 1e-12);
+  EXPECT_DOUBLE_EQ(table.between_at(1), 0.2);
   EXPECT_THROW(table.at("no such", 10, 0.1, 0.5), FileError);
 }
 
@@ -386,9 +419,10 @@ TEST(AccuracyTableFormat, DamagedTablesAreRefused) {
     std::ofstream(path, std::ios::trunc) << whole.substr(0, size);
     EXPECT_THROW(read_accuracy(path), FileError) << size;
   }
-  for (const auto& [from, to] : {std::pair<std::string, std::string>{"\"version\": 2", "\"version\": 99"},
+  for (const auto& [from, to] : {std::pair<std::string, std::string>{"\"version\": 3", "\"version\": 99"},
                                  {"heddle accuracy", "heddle chart"},
                                  {"1000.0", "10.0"},
+                                 {"0.2,\n  0.4", "0.2"},
                                  {"\"threads\": 2", "\"threads\": \"2\""}}) {
     std::string damaged = whole;
     ASSERT_NE(damaged.find(from), std::string::npos) << from;
@@ -397,39 +431,38 @@ TEST(AccuracyTableFormat, DamagedTablesAreRefused) {
   }
 }
 
-TEST(CutToOrder, KeepsTheLowBands) {
-  Transfer transfer;
-  transfer.order = 3;
-  transfer.cell_of_segment = {0, 1};
-  transfer.paths = {8, 9};
-  for (int k = 0; k < 2 * 16 * 16 * 3; ++k) transfer.matrices.push_back(static_cast<float>(k % 97));
-  transfer.standard_error.assign(2 * 4 * 3, 1);
-  transfer.cones.emplace();
-  constexpr std::size_t kOnCones = ConeTransfer::kWidths * ConeTransfer::kAzimuths * 3;
-  transfer.cones->harmonics = transfer.matrices;
-  for (std::size_t k = 0; k < 2 * 16 * kOnCones; ++k) transfer.cones->moments.push_back(static_cast<float>(k % 89));
-  const Transfer cut = cut_to_order(transfer, 1);
-  EXPECT_EQ(cut.order, 1);
-  EXPECT_EQ(cut.matrices.size(), 2U * 4 * 4 * 3);
-  EXPECT_EQ(cut.standard_error.size(), 2U * 2 * 3);
-  // Light of the low bands only: the low bands of what arrives are the same.
-  std::vector<float> light(16, 0);
-  for (std::size_t j = 0; j < 4; ++j) light[j] = static_cast<float>(j + 1);
-  std::vector<float> whole(16 * 3);
-  std::vector<float> low(4 * 3);
-  for (const std::uint32_t cell : {0U, 1U}) {
-    transfer.incoming(cell, light.data(), whole.data());
-    cut.incoming(cell, light.data(), low.data());
-    for (std::size_t k = 0; k < low.size(); ++k) EXPECT_FLOAT_EQ(low[k], whole[k]) << cell;
-    transfer.incoming(cell, light.data(), 0.5F, whole.data());
-    cut.incoming(cell, light.data(), 0.5F, low.data());
-    for (std::size_t k = 0; k < low.size(); ++k) EXPECT_FLOAT_EQ(low[k], whole[k]) << cell;
-    std::vector<float> whole_cones(kOnCones);
-    std::vector<float> low_cones(kOnCones);
-    transfer.incoming_on_cones(cell, light.data(), whole_cones.data());
-    cut.incoming_on_cones(cell, light.data(), low_cones.data());
-    for (std::size_t k = 0; k < kOnCones; ++k) EXPECT_FLOAT_EQ(low_cones[k], whole_cones[k]) << cell;
+/// A disk of radius 2 mm, or the half of it with x > 0, `height` over z = 0.
+TriangleMesh roof(float height, bool half) {
+  constexpr int kCorners = 240;
+  TriangleMesh mesh;
+  mesh.positions.emplace_back(0, 0, height);
+  for (int k = 0; k <= kCorners; ++k) {
+    const float angle = (half ? kPif : 2 * kPif) * static_cast<float>(k) / kCorners - 0.5F * kPif;
+    mesh.positions.emplace_back(2 * std::cos(angle), 2 * std::sin(angle), height);
+    if (k > 0) mesh.triangles.push_back({0, static_cast<std::uint32_t>(k), static_cast<std::uint32_t>(k + 1)});
   }
+  return mesh;
+}
+
+// A disk of radius r at height h over a place covers r^2 / (r^2 + h^2) of its cosine-weighted hemisphere.
+TEST(EnclosureLaw, IsTheShareOfTheHemisphereThatIsCovered) {
+  const auto tile = std::make_shared<TileScene>(crossed_layers(test_cotton()));
+  const auto of = [&](std::vector<TriangleMesh> meshes, const Vec3& direction) {
+    const ClothScene scene({{tile, flat_cloth(20, 20)}}, std::move(meshes));
+    // Along a tilted ray that meets the cloth next to the axis of the roof.
+    const std::optional<ShellHit> hit =
+        scene.first_fiber({Vec3d(0.01, 0.01, 0) - 0.5 * direction.cast<double>(), direction});
+    return hit ? enclosure(scene, *hit, direction) : -1.0;
+  };
+  const Vec3 down = Vec3(0.01F, 0, -1).normalized();
+  const Vec3 up = Vec3(0.01F, 0, 1).normalized();
+  const auto top = static_cast<float>(tile->exemplar().z_max);
+  EXPECT_EQ(of({}, down), 0);
+  EXPECT_NEAR(of({roof(top + 2, false)}, down), 0.5, 0.05);
+  EXPECT_NEAR(of({roof(top + 1, false)}, down), 0.8, 0.05);
+  EXPECT_NEAR(of({roof(top + 4, false)}, down), 0.2, 0.05);
+  EXPECT_NEAR(of({roof(top + 1, true)}, down), 0.4, 0.09);
+  EXPECT_EQ(of({roof(top + 1, false)}, up), 0) << "what is behind the side that is seen does not matter";
 }
 
 /// The table of the small fabric, measured with little effort.
@@ -472,6 +505,19 @@ TEST(MeasureAccuracyStatistical, SaysWhatHoldsOfAnyFabric) {
     EXPECT_GE(at("exact", 1).noise_square, at("exact", 0.02).noise_square);
     EXPECT_LT(at("exact", 1).bias_square, at("exact", 0.02).bias_square + 3 * at("exact", 0.02).bias_square_error);
   }
+  // What a setting changes is part of what it errs by: the root of one is at most the other's and the base's together.
+  for (const double sharpness : table.sharpness) {
+    EXPECT_EQ(table.at("exact", sharpness, 0.02, 0.8).change_square, 0);
+    const Accuracy low = table.at(order_setting(1), sharpness, 0.3, 0.8);
+    const Accuracy base = table.at("exact", sharpness, 0.3, 0.8);
+    EXPECT_GT(low.change_square, 0) << sharpness;
+    EXPECT_LT(std::sqrt(low.change_square), std::sqrt(std::max(0.0, low.bias_square) + 2 * low.bias_square_error) +
+                                                std::sqrt(std::max(0.0, base.bias_square) + 2 * base.bias_square_error))
+        << sharpness;
+    EXPECT_GT(table.between_at(sharpness), 0) << "folds light each other";
+  }
+  EXPECT_GT(table.bent_enclosure_square, 0.002);
+  EXPECT_LT(table.bent_enclosure_square, 0.1) << "folds of 35 degrees see little of each other";
   // Light that both forms of visibility treat alike.
   const auto bias = [&](const char* setting, double sharpness) {
     return table.at(setting, sharpness, 0.02, 0.8).bias_square;

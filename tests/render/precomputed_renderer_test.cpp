@@ -281,6 +281,34 @@ TEST(PrecomputedRenderer, BackgroundAndAlphaFillWhatTheClothLeaves) {
   EXPECT_GT(empty, 10);
 }
 
+TEST(PrecomputedRenderer, ALowerOrderIsThatOfDataCutToIt) {
+  FabricPack pack = open_pack(test_cotton());
+  Transfer& transfer = *pack.transfer;
+  transfer.order = 2;
+  RandomStream random(1, RandomStage::kTest, 0, 0);
+  transfer.matrices.resize(std::size_t{9} * 9 * 3);
+  for (float& value : transfer.matrices) value = random.uniform();
+  transfer.standard_error.assign(std::size_t{3} * 3, 0);
+  const std::vector<Light> lights = {directional({0.3F, 0.2F, 1}, 1)};
+  const auto shown = [](const World& world, std::optional<int> order) {
+    const PrecomputedSettings settings{
+        .shadow_sigma_mm = {}, .blend = {}, .transfer_order = order, .interactive = {}};
+    return shade_picture(world.renderer(settings), camera_above(1, 8, 8), {0, 0, 8, 8}, 2, kNoProgress).multiple;
+  };
+  const auto whole = make_world(pack, lights);
+  pack.transfer = cut_to_order(*pack.transfer, 1);
+  const auto cut = make_world(pack, lights);
+  const std::vector<Rgb> expected = shown(*cut, {});
+  const std::vector<Rgb> by_setting = shown(*whole, 1);
+  const std::vector<Rgb> uncut = shown(*whole, {});
+  double difference = 0;
+  for (std::size_t k = 0; k < expected.size(); ++k) {
+    EXPECT_TRUE((by_setting[k] == expected[k]).all()) << k;
+    difference += static_cast<double>((uncut[k] - expected[k]).abs().maxCoeff());
+  }
+  EXPECT_GT(difference, 0.1);
+}
+
 TEST(PrecomputedRendererAgreement, VolumeSeesWhatFibersShow) {
   const auto world = make_world(open_pack(test_cotton()), {directional({0.3F, 0.2F, 1}, 1)});
   PrecomputedSettings settings;

@@ -144,5 +144,40 @@ TEST(TransferFormat, ACellThatIsNotThereIsAnError) {
   EXPECT_THROW(read_transfer(folder.path() / "transfer.safetensors"), FileError);
 }
 
+TEST(CutToOrder, KeepsTheLowBands) {
+  Transfer transfer;
+  transfer.order = 3;
+  transfer.cell_of_segment = {0, 1};
+  transfer.paths = {8, 9};
+  for (int k = 0; k < 2 * 16 * 16 * 3; ++k) transfer.matrices.push_back(static_cast<float>(k % 97));
+  transfer.standard_error.assign(2 * 4 * 3, 1);
+  transfer.cones.emplace();
+  constexpr std::size_t kOnCones = ConeTransfer::kWidths * ConeTransfer::kAzimuths * 3;
+  transfer.cones->harmonics = transfer.matrices;
+  for (std::size_t k = 0; k < 2 * 16 * kOnCones; ++k) transfer.cones->moments.push_back(static_cast<float>(k % 89));
+  const Transfer cut = cut_to_order(transfer, 1);
+  EXPECT_EQ(cut.order, 1);
+  EXPECT_EQ(cut.matrices.size(), 2U * 4 * 4 * 3);
+  EXPECT_EQ(cut.standard_error.size(), 2U * 2 * 3);
+  // Light of the low bands only: the low bands of what arrives are the same.
+  std::vector<float> light(16, 0);
+  for (std::size_t j = 0; j < 4; ++j) light[j] = static_cast<float>(j + 1);
+  std::vector<float> whole(16 * 3);
+  std::vector<float> low(4 * 3);
+  for (const std::uint32_t cell : {0U, 1U}) {
+    transfer.incoming(cell, light.data(), whole.data());
+    cut.incoming(cell, light.data(), low.data());
+    for (std::size_t k = 0; k < low.size(); ++k) EXPECT_FLOAT_EQ(low[k], whole[k]) << cell;
+    transfer.incoming(cell, light.data(), 0.5F, whole.data());
+    cut.incoming(cell, light.data(), 0.5F, low.data());
+    for (std::size_t k = 0; k < low.size(); ++k) EXPECT_FLOAT_EQ(low[k], whole[k]) << cell;
+    std::vector<float> whole_cones(kOnCones);
+    std::vector<float> low_cones(kOnCones);
+    transfer.incoming_on_cones(cell, light.data(), whole_cones.data());
+    cut.incoming_on_cones(cell, light.data(), low_cones.data());
+    for (std::size_t k = 0; k < kOnCones; ++k) EXPECT_FLOAT_EQ(low_cones[k], whole_cones[k]) << cell;
+  }
+}
+
 }  // namespace
 }  // namespace heddle
