@@ -142,7 +142,7 @@ Estimate weighed(Estimate thought, Estimate measured, double unseen) {
 }
 
 Estimate alike(const Estimate& thought, const Estimate& like_thought, const Estimate& like_seen) {
-  const double value = like_seen.value >= like_thought.value
+  const double value = like_seen.value >= like_thought.value || !(like_thought.value > 0)
                            ? thought.value + like_seen.value - like_thought.value
                            : thought.value * std::max(0.0, like_seen.value) / like_thought.value;
   return {value, std::min(std::hypot(like_seen.error, kTableError * (thought.value - like_thought.value)),
