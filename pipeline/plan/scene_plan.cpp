@@ -60,7 +60,7 @@ constexpr std::uint64_t kPilotSeed = 0x9107;
 constexpr std::size_t kMostApart = 3;
 // Path-traced samples in the time that an accuracy table takes, its own data left out (measure_accuracy.h): where a plan needs
 // fewer in all, path tracing is cheaper than finding out.
-constexpr double kTableSamples = 2e6;
+constexpr double kTableSamples = 4e6;
 
 /// What a fabric's tables and stages say; one per fabric file.
 struct Fabric {
