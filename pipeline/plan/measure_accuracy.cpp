@@ -286,26 +286,24 @@ class TableMaker {
     for (int level = 0; level < kLevels; ++level) table_.footprint_mm.push_back(std::ldexp(swatch.pixel_mm(), level));
   }
 
-  /// The first setting is the reference of all. `change_of`: the setting, added before, that this one is a change of, or none.
+  /// The first setting, "path", is the reference of all. `change_of`: the setting, added before, that this one is a change of, or none.
   void add(const std::string& name, const Shoot& shoot, const std::string& change_of = "") {
     SettingAccuracy setting;
     setting.name = name;
     double samples = 0;
     std::size_t shots = 0;
-    const bool is_reference = table_.settings.empty();
     std::vector<FrameBuffers>& own = frames_[name];
     const std::vector<FrameBuffers>& unchanged = change_of.empty() ? own : frames_.at(change_of);
     const auto compare_with = [&](std::size_t picture, const Camera& camera, const Light& light, bool bent,
                                   int levels) {
       (*progress_)((static_cast<double>(done_) + static_cast<double>(shots) / kShots) / static_cast<double>(steps_));
       const Shot shot = shoot(camera, {light}, bent);
-      if (is_reference) reference_.push_back(shot.frame);
       own.push_back(shot.frame);
       setting.setup_seconds += shot.setup_seconds;
       setting.seconds_per_sample += shot.seconds;
       samples += static_cast<double>(shot.frame.pixel_count()) * shot.frame.spp;
       ++shots;
-      return compare(shot.frame, reference_[picture], unchanged[picture], levels);
+      return compare(shot.frame, reference()[picture], unchanged[picture], levels);
     };
     std::size_t picture = 0;
     for (const double sharpness : kSharpnesses) {
@@ -343,7 +341,7 @@ class TableMaker {
         const FrameBuffers all = shoot(Swatch::bent_camera(pair, swatch_->effort().bent_pixels),
                                        {light_of(sharpness, kBentPairs[pair])}, true)
                                      .frame;
-        bent.push_back(compare(reference_[picture], all, all, 1)[0]);
+        bent.push_back(compare(reference()[picture], all, all, 1)[0]);
       }
       table_.bent_between.push_back(accuracy_of(bent).bias_square);
     }
@@ -358,10 +356,10 @@ class TableMaker {
   void add_through(const Shoot& shoot) {
     Rgbd front = Rgbd::Zero();
     Rgbd behind = Rgbd::Zero();
-    const std::size_t first = reference_.size() - std::size(kPairs) - std::size(kBentPairs);
+    const std::size_t first = reference().size() - std::size(kPairs) - std::size(kBentPairs);
     for (std::size_t pair = 0; pair < std::size(kPairs); ++pair) {
       const Light light = light_of(kDirectionalSharpness, from_behind(kPairs[pair]));
-      front += sum_of(reference_[first + pair]);
+      front += sum_of(reference()[first + pair]);
       behind += sum_of(shoot(swatch_->camera(pair), {light}, false).frame);
     }
     if (!(front.mean() > 0)) return;  // black cloth
@@ -374,6 +372,8 @@ class TableMaker {
  private:
   static constexpr double kShots =
       static_cast<double>(std::size(kSharpnesses) * (std::size(kPairs) + std::size(kBentPairs)));
+
+  const std::vector<FrameBuffers>& reference() const { return frames_.at("path"); }
 
   static Rgbd sum_of(const FrameBuffers& frame) {
     Rgbd sum = Rgbd::Zero();
@@ -411,8 +411,7 @@ class TableMaker {
   const AccuracyProgress* progress_;
   std::size_t steps_;
   std::size_t done_ = 0;
-  std::vector<FrameBuffers> reference_;                      // [light][pair, bent pair]
-  std::map<std::string, std::vector<FrameBuffers>> frames_;  // of settings
+  std::map<std::string, std::vector<FrameBuffers>> frames_;  // of settings: [light][pair, bent pair]
   AccuracyTable table_;
 };
 

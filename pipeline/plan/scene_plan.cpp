@@ -79,6 +79,21 @@ struct LightShare {
   double cosine;  // to the cloth's normal, mean over what is seen
 };
 
+/// A squared error over lights of these weights: half as if errors were the same everywhere, half as if they had nothing to do with each
+/// other.
+class OverLights {
+ public:
+  void add(double weight, double square) {
+    together_ += weight * std::sqrt(std::max(0.0, square));
+    apart_ += weight * weight * square;
+  }
+  double square() const { return 0.5 * (together_ * together_ + apart_); }
+
+ private:
+  double together_ = 0;
+  double apart_ = 0;
+};
+
 /// Light on one pixel's cloth, by the side it falls on; in the units of the lights.
 struct PixelLight {
   struct OnSide {
@@ -129,9 +144,9 @@ class ScenePlanner {
     return request;
   }
 
-  SceneJob::Crops shoot(SceneJob& job, const PictureRequest& request) {
+  SceneJob::Crops shoot(SceneJob& job, const PictureRequest& request, std::optional<int> transfer_order = {}) {
     const Stopwatch watch;
-    SceneJob::Crops crops = job.render_crops(request, blocks_);
+    SceneJob::Crops crops = job.render_crops(request, blocks_, transfer_order);
     loading_ = loading_ + (watch.elapsed() - crops.setup - crops.rendering);
     return crops;
   }
@@ -537,8 +552,7 @@ class ScenePlanner {
     const double footprint = plan_.seen[cloth].footprint_mm;
     Rgbd flat_error = Rgbd::Zero();   // of the mean
     Rgbd folds_error = Rgbd::Zero();  // what folds add to it
-    double together = 0;              // of errors apart from the mean's, if they are the same everywhere
-    double apart = 0;                 // of their squares, if they have nothing to do with each other
+    OverLights rest;                  // of errors apart from the mean's
     double error = 0;
     double noise = 0;
     double path_noise = 0;
@@ -575,8 +589,7 @@ class ScenePlanner {
       const double square = std::max(0.0, parts.rest_square);
       flat_error += light.weight * (parts.flat_ratio - 1);
       folds_error += light.weight * (parts.folds_ratio - 1);
-      together += light.weight * std::sqrt(square);
-      apart += weight * square;
+      rest.add(light.weight, square);
       error += weight * unsure;
       noise += weight * base.noise_square;
       path_noise += weight * at("path").noise_square;
@@ -584,7 +597,7 @@ class ScenePlanner {
     OfCloth result;
     const double of_mean = table.mean_square(1 + flat_error) + table.mean_square(1 + folds_error) +
                            2 * (table.color.square() * (flat_error * folds_error).max(0)).mean();
-    const double square = of_mean + 0.5 * (together * together + apart);
+    const double square = of_mean + rest.square();
     result.bias_square = {square, std::hypot(error, kTableError * square)};
     result.mean_error = (table.color * (flat_error + folds_error)).mean();
     if (path_noise > 0) result.noise_ratio = noise / path_noise;
@@ -964,11 +977,8 @@ class ScenePlanner {
   /// noise.
   void measure_stress() {
     constexpr int kLowOrder = kOtherOrders[0];
-    const auto own = std::find_if(plan_.ways.begin(), plan_.ways.end(), [this](const Way& way) {
-      return way.method == RenderMethod::kExact && way.variant.blend == VisibilityBlend{} &&
-             way.variant.stand_ins.empty() && std::all_of(fabrics_.begin(), fabrics_.end(), [&](const auto& fabric) {
-               return way.variant.of(fabric->file) == SceneVariant::OfFabric{};
-             });
+    const auto own = std::find_if(plan_.ways.begin(), plan_.ways.end(), [](const Way& way) {
+      return way.method == RenderMethod::kExact && way.candidate.changes == 0;
     });
     if (stress_ || own == plan_.ways.end() || own->candidate.build_seconds > 0) return;
     double thought = 0;
@@ -976,22 +986,18 @@ class ScenePlanner {
       if (!is_seen_fibers(k)) continue;
       const Fabric& fabric = *fabric_of(plan_.scene.cloths[k].fabric);
       if (plan_.scene.cloths[k].mesh || fabric.order <= kLowOrder) return;
-      double together = 0;
-      double apart = 0;
+      OverLights changes;
       for (const LightShare& light : lights_of_cloth_[k]) {
-        const double square =
+        changes.add(
+            light.weight,
             fabric.table->at(order_setting(kLowOrder), light.sharpness, plan_.seen[k].footprint_mm, light.cosine)
-                .change_square;
-        together += light.weight * std::sqrt(std::max(0.0, square));
-        apart += light.weight * light.weight * square;
+                .change_square);
       }
-      thought += weight_of(k) * 0.5 * (together * together + apart);
+      thought += weight_of(k) * changes.square();
     }
     const PictureRequest request = pilot_request(RenderMethod::kExact, 2);
     const SceneJob::Crops whole = shoot(*job_, request);
-    const Stopwatch watch;
-    const SceneJob::Crops low = job_->render_crops(request, blocks_, kLowOrder);
-    loading_ = loading_ + (watch.elapsed() - low.setup - low.rendering);
+    const SceneJob::Crops low = shoot(*job_, request, kLowOrder);
     const double mean = mean_radiance(whole.frames);
     const double change = mean > 0 ? squared_bias(low.frames, whole.frames).value / (mean * mean) : 0;
     stress_ = thought > 0 && change > 0 ? std::clamp(std::sqrt(change / thought), 1.0, kMostStress) : 1;
