@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "fibers/baked/fabric_pack.h"
 #include "formats/atomic_file.h"
 #include "formats/input_error.h"
@@ -9,17 +11,31 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Copies a pack out of the cache, the manifest last: a copy cut short is refused by its checksums.
+/// May a pack take this place? Whole packs may be replaced, and what was left of one whose copy was cut short.
+bool may_hold_pack(const fs::path& folder) {
+  if (!fs::exists(folder)) return true;
+  if (!fs::is_directory(folder)) return false;
+  const fs::directory_iterator entries(folder);
+  return fs::exists(folder / kManifestName) || std::all_of(begin(entries), end(entries), [](const auto& entry) {
+           return is_pack_file(entry.path().filename().native());
+         });
+}
+
+/// Copies a pack out of the cache: beside its place, then into it as a whole.
 void copy_pack(const fs::path& from, const fs::path& to) {
-  std::error_code error;
-  if (fs::exists(to) && !fs::is_empty(to, error) && !fs::exists(to / kManifestName)) {
-    throw FileError(to.string() + ": exists and is not a pack; remove it or choose another name");
+  // A last slash is no part of the name.
+  const fs::path place = to.has_filename() ? to : to.parent_path();
+  if (!may_hold_pack(place)) {
+    throw FileError(place.string() + ": exists and is not a pack; remove it or choose another name");
   }
-  make_folder(to);
-  for (const auto& [name, file] : read_verified_manifest(from).files) {
-    write_file_atomically(to / name, read_whole_file(from / name));
+  make_folder(place.parent_path());
+  TemporaryPath copy(place);
+  make_folder(copy.path());
+  for (const auto& entry : fs::directory_iterator(from)) {
+    write_file_atomically(copy.path() / entry.path().filename(), read_whole_file(entry.path()));
   }
-  write_file_atomically(to / kManifestName, read_whole_file(from / kManifestName));
+  read_verified_manifest(copy.path());
+  copy.commit();
 }
 
 }  // namespace
