@@ -1,5 +1,3 @@
-#include <algorithm>
-
 #include "fibers/baked/fabric_pack.h"
 #include "formats/atomic_file.h"
 #include "formats/input_error.h"
@@ -11,23 +9,22 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// May a pack take this place? Whole packs may be replaced, and what was left of one whose copy was cut short.
-bool may_hold_pack(const fs::path& folder) {
-  if (!fs::exists(folder)) return true;
-  if (!fs::is_directory(folder)) return false;
-  const fs::directory_iterator entries(folder);
-  return fs::exists(folder / kManifestName) || std::all_of(begin(entries), end(entries), [](const auto& entry) {
-           return is_pack_file(entry.path().filename().native());
-         });
+/// FileError where a pack may not take this place. Packs may be replaced, whole or cut short, but nothing else is lost.
+void require_pack_or_nothing(const fs::path& place) {
+  if (!fs::exists(place)) return;
+  if (!fs::is_directory(place)) throw FileError(place.string() + ": exists and is not a folder");
+  for (const auto& entry : fs::directory_iterator(place)) {
+    if (is_pack_file(entry.path().filename().native())) continue;
+    throw FileError(entry.path().string() +
+                    ": is no part of a pack, and would be lost with its folder; remove it or choose another name");
+  }
 }
 
 /// Copies a pack out of the cache: beside its place, then into it as a whole.
 void copy_pack(const fs::path& from, const fs::path& to) {
   // A last slash is no part of the name.
   const fs::path place = to.has_filename() ? to : to.parent_path();
-  if (!may_hold_pack(place)) {
-    throw FileError(place.string() + ": exists and is not a pack; remove it or choose another name");
-  }
+  require_pack_or_nothing(place);
   make_folder(place.parent_path());
   TemporaryPath copy(place);
   make_folder(copy.path());

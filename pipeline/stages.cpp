@@ -280,7 +280,7 @@ bool FabricStages::publish_chunk(const Stage& stage, std::uint32_t first, std::u
       });
       return true;
     } catch (const FileError&) {
-      if (chunks.folder_exists()) throw;
+      if (!is_sound(stage, *context_) && chunks.folder_exists()) throw;
     }
   }
   return false;
