@@ -199,18 +199,26 @@ void AtomicFile::check() const {
 }
 
 void AtomicFile::write(std::span<const std::byte> bytes) {
-  buffer_.insert(buffer_.end(), bytes.begin(), bytes.end());
-  if (buffer_.size() >= kBufferBytes) write_buffer();
+  if (buffer_.size() + bytes.size() > kBufferBytes) write_buffer();
+  if (bytes.size() > kBufferBytes) {
+    write_now(bytes);
+  } else {
+    buffer_.insert(buffer_.end(), bytes.begin(), bytes.end());
+  }
 }
 
-void AtomicFile::write_buffer() {
-  for (std::span<const std::byte> rest = buffer_; !rest.empty();) {
+void AtomicFile::write_now(std::span<const std::byte> bytes) {
+  for (std::span<const std::byte> rest = bytes; !rest.empty();) {
     const ssize_t count = uninterrupted([&] { return ::write(descriptor_, rest.data(), rest.size()); });
     if (count <= 0) fail(count < 0 ? errno : ENOSPC);
     rest = rest.subspan(static_cast<std::size_t>(count));
     position_ += static_cast<std::uint64_t>(count);
   }
   size_ = std::max(size_, position_);
+}
+
+void AtomicFile::write_buffer() {
+  write_now(buffer_);
   buffer_.clear();
 }
 
@@ -233,6 +241,11 @@ void AtomicFile::commit() {
   const int closed = ::close(std::exchange(descriptor_, -1));
   if (closed != 0 && errno != EINTR) fail(errno);
   temporary_.commit();
+}
+
+void require_writable(const fs::path& target) {
+  if (fs::is_directory(target)) fail_at(target, "cannot write", EISDIR);
+  const AtomicFile removed_at_once(target);
 }
 
 void write_file_atomically(const fs::path& path, std::span<const std::byte> bytes) {

@@ -60,6 +60,7 @@ class AtomicFile {
 
  private:
   void fail(int reason);
+  void write_now(std::span<const std::byte> bytes);
   void write_buffer();
 
   TemporaryPath temporary_;
@@ -69,6 +70,9 @@ class AtomicFile {
   std::vector<std::byte> buffer_;
   int failure_ = 0;  // the system's reason
 };
+
+/// FileError where a file could not be put there now: for commands that work long before they write.
+void require_writable(const std::filesystem::path& target);
 
 void write_file_atomically(const std::filesystem::path& path, std::span<const std::byte> bytes);
 void write_file_atomically(const std::filesystem::path& path, std::string_view text);
