@@ -284,7 +284,7 @@ struct TomlTable::Document {
     for (const auto& [key, value] : values) {
       const std::string key_text(key.str());
       const std::string full_name = node.full_name.empty() ? key_text : node.full_name + "." + key_text;
-      const auto make_child = [&](const toml::table& child, const std::string& title) {
+      const auto make_child = [&, &key = key](const toml::table& child, const std::string& title) {
         auto result = std::make_unique<Node>();
         result->title = title;
         result->full_name = full_name;
