@@ -2,13 +2,25 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <linux/fs.h>
+#include <signal.h>
+#include <stdio.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
+#include <cassert>
 #include <cerrno>
+#include <chrono>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <string>
 #include <system_error>
+#include <utility>
 
+#include "formats/content_hash.h"
 #include "formats/input_error.h"
 
 namespace heddle {
@@ -17,8 +29,98 @@ namespace {
 
 namespace fs = std::filesystem;
 
-[[noreturn]] void fail(const fs::path& path, const char* what, int reason) {
+constexpr std::string_view kPrefix = ".heddle-";
+constexpr std::string_view kSuffix = ".tmp";
+constexpr int kMostLinks = 40;  // as the system's own limit
+constexpr std::size_t kBufferBytes = std::size_t{1} << 20;
+constexpr std::chrono::hours kForeignLifetime{24};
+
+[[noreturn]] void fail_at(const fs::path& path, const char* what, int reason) {
   throw FileError(fmt::format("{}: {}: {}", path.string(), what, std::generic_category().message(reason)));
+}
+
+/// Calls the system again where a signal cut it short.
+template <class Call>
+auto uninterrupted(Call&& call) {
+  auto result = call();
+  while (result < 0 && errno == EINTR) result = call();
+  return result;
+}
+
+/// Eight digits that differ between hosts and between containers that number their processes apart.
+const std::string& machine() {
+  static const std::string digits = [] {
+    char host[256] = {};
+    char processes[64] = {};
+    ::gethostname(host, sizeof(host) - 1);
+    if (::readlink("/proc/self/ns/pid", processes, sizeof(processes) - 1) < 0) processes[0] = '\0';
+    return content_hash(fmt::format("{} {}", host, processes)).substr(0, 8);
+  }();
+  return digits;
+}
+
+/// This process's temporary names, and the folders in which it has looked for those of dead processes.
+struct Registry {
+  std::mutex mutex;
+  std::set<fs::path> names;
+  std::set<fs::path> searched;
+};
+Registry& registry() {
+  static auto* const only = new Registry;  // outlives every other object
+  return *only;
+}
+
+fs::path folder_of(const fs::path& path) {
+  return path.has_parent_path() ? path.parent_path() : fs::path(".");
+}
+
+/// The process in a temporary name of this machine; 0 for those of others; empty for other names.
+std::optional<pid_t> process_of(std::string_view name) {
+  if (!name.starts_with(kPrefix) || !name.ends_with(kSuffix)) return {};
+  name.remove_prefix(kPrefix.size());
+  if (!name.starts_with(machine() + "-")) return 0;
+  return static_cast<pid_t>(std::atol(std::string(name.substr(machine().size() + 1)).c_str()));
+}
+
+/// Did the process that made this file or folder end without removing it?
+bool is_left_behind(const fs::path& path) {
+  const std::optional<pid_t> process = process_of(path.filename().native());
+  if (!process) return false;
+  if (*process == ::getpid()) return !registry().names.contains(path);  // an earlier process of the same number
+  if (*process != 0) return ::kill(*process, 0) != 0 && errno == ESRCH;
+  std::error_code error;
+  const fs::file_time_type written = fs::last_write_time(path, error);
+  return !error && fs::file_time_type::clock::now() - written > kForeignLifetime;
+}
+
+/// The registry's mutex is held by the caller.
+void remove_left_behind(const fs::path& folder) {
+  if (!registry().searched.insert(folder).second) return;
+  std::error_code ignored;  // what cannot be listed or removed costs space, nothing else
+  for (fs::directory_iterator entry(folder, ignored), end; !ignored && entry != end; entry.increment(ignored)) {
+    std::error_code stays;
+    if (is_left_behind(entry->path())) fs::remove_all(entry->path(), stays);
+  }
+}
+
+/// Follows links to the file that they stand for, which need not exist.
+fs::path resolved(fs::path target) {
+  const fs::path named = target;
+  for (int links = 0;; ++links) {
+    std::error_code no_link;
+    const fs::path next = fs::read_symlink(target, no_link);
+    if (no_link) return target;
+    if (links == kMostLinks) fail_at(named, "cannot write", ELOOP);
+    target = target.parent_path() / next;  // an absolute link replaces all of it
+  }
+}
+
+/// Makes renames inside a folder durable, where its file system can.
+void flush_folder(const fs::path& folder) {
+  const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor < 0) return;
+  ::fsync(descriptor);
+  ::close(descriptor);
 }
 
 class Descriptor {
@@ -30,101 +132,138 @@ class Descriptor {
   Descriptor(const Descriptor&) = delete;
   Descriptor& operator=(const Descriptor&) = delete;
   int number() const { return number_; }
-  /// Some file systems report a failed write here only.
-  int close() {
-    const int result = ::close(number_);
-    number_ = -1;
-    return result;
-  }
 
  private:
   int number_;
 };
 
-/// A new, empty file beside `target` that goes away unless it is renamed.
-class TemporaryFile {
- public:
-  explicit TemporaryFile(const fs::path& target) : target_(target) {
-    static std::atomic<unsigned> counter{0};
-    // A file left by a killed process may carry the same name; others have a different number.
-    for (int attempt = 0; attempt < 1000; ++attempt) {
-      const std::string name = fmt::format(".{}.tmp-{}-{}{}", target.stem().string(), ::getpid(), counter++,
-                                           target.extension().string());
-      path_ = target.parent_path() / name;
-      const Descriptor file(::open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
-      if (file.number() >= 0) return;
-      if (errno != EEXIST) fail(target, "cannot create a file in this folder", errno);
-    }
-    fail(target, "cannot create a file in this folder", EEXIST);
-  }
-  ~TemporaryFile() {
-    if (!renamed_) ::unlink(path_.c_str());
-  }
-  TemporaryFile(const TemporaryFile&) = delete;
-  TemporaryFile& operator=(const TemporaryFile&) = delete;
-
-  const fs::path& path() const { return path_; }
-
-  void flush_and_rename() {
-    Descriptor file(::open(path_.c_str(), O_RDONLY | O_CLOEXEC));
-    if (file.number() < 0) fail(target_, "cannot write", errno);
-    if (::fsync(file.number()) != 0 || file.close() != 0) fail(target_, "cannot write", errno);
-    if (::rename(path_.c_str(), target_.c_str()) != 0) fail(target_, "cannot replace", errno);
-    renamed_ = true;
-    const fs::path folder = target_.has_parent_path() ? target_.parent_path() : fs::path(".");
-    const Descriptor directory(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-    // Some network file systems cannot flush a folder (EINVAL); the rename itself has been done.
-    if (directory.number() >= 0 && ::fsync(directory.number()) != 0 && errno != EINVAL) {
-      fail(target_, "cannot flush the folder", errno);
-    }
-  }
-
- private:
-  fs::path target_;
-  fs::path path_;
-  bool renamed_ = false;
-};
-
 }  // namespace
 
-void write_file_atomically(const fs::path& path,
-                           const std::function<void(const fs::path& temporary)>& write) {
-  TemporaryFile temporary(path);
-  write(temporary.path());
-  temporary.flush_and_rename();
+TemporaryPath::TemporaryPath(const fs::path& target) : target_(resolved(target)) {
+  static std::atomic<unsigned> counter{0};
+  const fs::path folder = folder_of(target_);
+  path_ = target_.parent_path() / fmt::format("{}{}-{}-{}{}", kPrefix, machine(), ::getpid(), counter++, kSuffix);
+  const std::lock_guard lock(registry().mutex);
+  remove_left_behind(folder);
+  registry().names.insert(path_);
+}
+
+TemporaryPath::~TemporaryPath() {
+  std::error_code ignored;
+  if (!committed_) fs::remove_all(path_, ignored);
+  const std::lock_guard lock(registry().mutex);
+  registry().names.erase(path_);
+}
+
+void TemporaryPath::commit() {
+  std::error_code error;
+  if (fs::is_directory(path_, error)) flush_folder(path_);
+  if (fs::is_directory(path_, error) && fs::is_directory(target_, error)) {
+    // The old folder takes the temporary name, under which it is removed.
+    if (::renameat2(AT_FDCWD, path_.c_str(), AT_FDCWD, target_.c_str(), RENAME_EXCHANGE) != 0) {
+      const bool cannot_exchange = errno == EINVAL || errno == ENOSYS;
+      if (!cannot_exchange) fail_at(target_, "cannot replace", errno);
+      TemporaryPath aside(target_);
+      if (::rename(target_.c_str(), aside.path_.c_str()) != 0) fail_at(target_, "cannot replace", errno);
+      if (::rename(path_.c_str(), target_.c_str()) != 0) {
+        const int reason = errno;
+        ::rename(aside.path_.c_str(), target_.c_str());
+        fail_at(target_, "cannot replace", reason);
+      }
+    }
+    fs::remove_all(path_, error);
+  } else if (::rename(path_.c_str(), target_.c_str()) != 0) {
+    fail_at(target_, "cannot replace", errno);
+  }
+  committed_ = true;
+  flush_folder(folder_of(target_));
+}
+
+AtomicFile::AtomicFile(const fs::path& target) : temporary_(target) {
+  descriptor_ = uninterrupted(
+      [&] { return ::open(temporary_.path().c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666); });
+  if (descriptor_ < 0) fail_at(temporary_.target(), "cannot create a file in this folder", errno);
+}
+
+AtomicFile::~AtomicFile() {
+  if (descriptor_ >= 0) ::close(descriptor_);
+}
+
+void AtomicFile::fail(int reason) {
+  failure_ = reason;
+  check();
+}
+
+void AtomicFile::check() const {
+  if (failure_ != 0) fail_at(temporary_.target(), "cannot write", failure_);
+}
+
+void AtomicFile::write(std::span<const std::byte> bytes) {
+  buffer_.insert(buffer_.end(), bytes.begin(), bytes.end());
+  if (buffer_.size() >= kBufferBytes) write_buffer();
+}
+
+void AtomicFile::write_buffer() {
+  for (std::span<const std::byte> rest = buffer_; !rest.empty();) {
+    const ssize_t count = uninterrupted([&] { return ::write(descriptor_, rest.data(), rest.size()); });
+    if (count <= 0) fail(count < 0 ? errno : ENOSPC);
+    rest = rest.subspan(static_cast<std::size_t>(count));
+    position_ += static_cast<std::uint64_t>(count);
+  }
+  size_ = std::max(size_, position_);
+  buffer_.clear();
+}
+
+void AtomicFile::seek(std::uint64_t position) {
+  write_buffer();
+  assert(position <= size_);
+  if (::lseek(descriptor_, static_cast<off_t>(position), SEEK_SET) < 0) fail(errno);
+  position_ = position;
+}
+
+void AtomicFile::commit() {
+  check();
+  write_buffer();
+  struct stat status {};
+  if (uninterrupted([&] { return ::fsync(descriptor_); }) != 0 || ::fstat(descriptor_, &status) != 0) {
+    fail(errno);
+  }
+  if (static_cast<std::uint64_t>(status.st_size) != size_) fail(EIO);
+  // Some file systems report a failed write here only. A signal does not keep the descriptor open.
+  const int closed = ::close(std::exchange(descriptor_, -1));
+  if (closed != 0 && errno != EINTR) fail(errno);
+  temporary_.commit();
 }
 
 void write_file_atomically(const fs::path& path, std::span<const std::byte> bytes) {
-  write_file_atomically(path, [&](const fs::path& temporary) {
-    Descriptor file(::open(temporary.c_str(), O_WRONLY | O_CLOEXEC));
-    if (file.number() < 0) fail(path, "cannot write", errno);
-    for (std::span<const std::byte> rest = bytes; !rest.empty();) {
-      const ssize_t count = ::write(file.number(), rest.data(), rest.size());
-      if (count < 0 && errno == EINTR) continue;
-      if (count <= 0) fail(path, "cannot write", count < 0 ? errno : ENOSPC);
-      rest = rest.subspan(static_cast<std::size_t>(count));
-    }
-    if (file.close() != 0) fail(path, "cannot write", errno);
-  });
+  AtomicFile file(path);
+  file.write(bytes);
+  file.commit();
 }
 
 void write_file_atomically(const fs::path& path, std::string_view text) {
   write_file_atomically(path, std::as_bytes(std::span(text)));
 }
 
+void remove_own_temporaries() noexcept {
+  std::error_code ignored;
+  const std::lock_guard lock(registry().mutex);
+  for (const fs::path& name : registry().names) fs::remove_all(name, ignored);
+}
+
 std::vector<std::byte> read_whole_file(const fs::path& path) {
-  const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  const Descriptor file(uninterrupted([&] { return ::open(path.c_str(), O_RDONLY | O_CLOEXEC); }));
   struct stat status {};
-  if (file.number() < 0 || ::fstat(file.number(), &status) != 0) fail(path, "cannot open", errno);
-  if (S_ISDIR(status.st_mode)) fail(path, "cannot read", EISDIR);
+  if (file.number() < 0 || ::fstat(file.number(), &status) != 0) fail_at(path, "cannot open", errno);
+  if (S_ISDIR(status.st_mode)) fail_at(path, "cannot read", EISDIR);
   // One byte more than the size, so that the end of the file shows without growing.
   std::vector<std::byte> bytes(static_cast<std::size_t>(status.st_size) + 1);
   std::size_t size = 0;
   while (true) {
     if (size == bytes.size()) bytes.resize(2 * size);
-    const ssize_t count = ::read(file.number(), bytes.data() + size, bytes.size() - size);
-    if (count < 0 && errno == EINTR) continue;
-    if (count < 0) fail(path, "cannot read", errno);
+    const ssize_t count =
+        uninterrupted([&] { return ::read(file.number(), bytes.data() + size, bytes.size() - size); });
+    if (count < 0) fail_at(path, "cannot read", errno);
     if (count == 0) break;
     size += static_cast<std::size_t>(count);
   }

@@ -47,4 +47,23 @@ std::string content_hash_of_file(const std::filesystem::path& path) {
   return hexadecimal(XXH3_128bits_digest(state.get()));
 }
 
+FileSeal seal_of_file(const std::filesystem::path& path) {
+  return {std::filesystem::file_size(path), content_hash_of_file(path)};
+}
+
+void verify_seal(const std::filesystem::path& path, const FileSeal& seal, const std::string& source) {
+  std::error_code error;
+  const std::uintmax_t size = std::filesystem::file_size(path, error);
+  if (error) throw FileError(fmt::format("{}: named in {} but: {}", path.string(), source, error.message()));
+  if (size != seal.bytes) {
+    throw FileError(fmt::format("{}: {} bytes, {} says {}: truncated or replaced", path.string(), size, source,
+                                seal.bytes));
+  }
+  const std::string found = content_hash_of_file(path);
+  if (found != seal.xxh3_128) {
+    throw FileError(
+        fmt::format("{}: checksum {}, {} says {}: corrupt", path.string(), found, source, seal.xxh3_128));
+  }
+}
+
 }  // namespace heddle

@@ -1,16 +1,18 @@
 #include "formats/id_volume_file.h"
 
 #include <fmt/format.h>
+#include <openvdb/io/Stream.h>
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/Dense.h>
 
 #include <algorithm>
 #include <cassert>
 #include <cmath>
-#include <fstream>
 #include <limits>
+#include <sstream>
 
 #include "formats/atomic_file.h"
+#include "formats/content_hash.h"
 #include "formats/input_error.h"
 
 namespace heddle {
@@ -28,8 +30,8 @@ constexpr const char* kVoxelKey = "voxel_mm";
 constexpr const char* kOriginKey = "origin_mm";
 
 // OpenVDB puts a random identifier (36 characters) into the header of each file it writes: after the magic
-// number (8 bytes), three version numbers (4 bytes each) and a flag (1 byte). Here it is all zeros.
-constexpr std::streamoff kIdentifierAt = 21;
+// number (8 bytes), three version numbers (4 bytes each) and a flag (1 byte). Here it is the file's checksum.
+constexpr std::size_t kIdentifierAt = 21;
 constexpr std::string_view kZeroIdentifier = "00000000-0000-0000-0000-000000000000";
 
 /// x fastest, like IdVolume::ids.
@@ -66,22 +68,29 @@ openvdb::math::Transform::Ptr transform_of(const IdVolume& volume) {
   return transform;
 }
 
-void zero_identifier(const std::filesystem::path& path) {
-  std::fstream file(path, std::ios::binary | std::ios::in | std::ios::out);
-  std::string found(kZeroIdentifier.size(), '\0');
-  file.seekg(kIdentifierAt);
-  file.read(found.data(), static_cast<std::streamsize>(found.size()));
-  for (std::size_t i = 0; i < found.size(); ++i) {
-    if ((found[i] == '-') != (kZeroIdentifier[i] == '-')) throw FileError("unexpected OpenVDB file header");
-  }
-  file.seekp(kIdentifierAt);
-  file.write(kZeroIdentifier.data(), static_cast<std::streamsize>(kZeroIdentifier.size()));
-  file.close();
-  if (!file) throw FileError("cannot patch the file header");
+/// 32 hexadecimal digits as an identifier is written: in groups of 8, 4, 4, 4 and 12.
+std::string as_identifier(const std::string& digits) {
+  std::string text = digits;
+  for (const std::size_t dash : {8, 13, 18, 23}) text.insert(dash, "-");
+  return text;
 }
 
-void write_vdb(const std::filesystem::path& path, const IdVolume& volume,
-               const std::map<std::string, std::string>& metadata) {
+/// Checksum of a file's bytes with zeros in place of the identifier.
+std::string checksum_of(std::string bytes) {
+  bytes.replace(kIdentifierAt, kZeroIdentifier.size(), kZeroIdentifier);
+  return as_identifier(content_hash(bytes));
+}
+
+/// Opens the library's writer into any stream; the file offsets that it notes for other programs need one that can seek.
+class SeekableArchive : public openvdb::io::Archive {
+ public:
+  Ptr copy() const override { return std::make_shared<SeekableArchive>(*this); }
+  void write_to(std::ostream& stream, const openvdb::GridCPtrVec& grids) const { write(stream, grids, true); }
+  void write(const openvdb::GridCPtrVec&, const openvdb::MetaMap&) const override { assert(false); }
+  using openvdb::io::Archive::write;
+};
+
+std::string vdb_bytes(const IdVolume& volume, const std::map<std::string, std::string>& metadata) {
   openvdb::initialize();
   auto grid = openvdb::Int32Grid::create(kEmpty);
   grid->setName(kGridName);
@@ -94,13 +103,16 @@ void write_vdb(const std::filesystem::path& path, const IdVolume& volume,
   const DenseIds dense(box_of(volume.size), const_cast<std::int32_t*>(volume.ids.data()));
   openvdb::tools::copyFromDense(dense, *grid, std::int32_t{0});
 
-  openvdb::io::File file(path.string());
+  SeekableArchive archive;
   std::uint32_t compression = openvdb::io::COMPRESS_ACTIVE_MASK;
   if (openvdb::io::Archive::hasBloscCompression()) compression |= openvdb::io::COMPRESS_BLOSC;
-  file.setCompression(compression);
-  file.write(openvdb::GridCPtrVec{grid});
-  file.close();
-  zero_identifier(path);
+  archive.setCompression(compression);
+  std::ostringstream stream(std::ios::binary);
+  archive.write_to(stream, openvdb::GridCPtrVec{grid});
+  if (!stream) throw FileError("out of memory");
+  std::string bytes = std::move(stream).str();
+  bytes.replace(kIdentifierAt, kZeroIdentifier.size(), checksum_of(bytes));
+  return bytes;
 }
 
 template <class Metadata>
@@ -110,12 +122,21 @@ auto required_metadata(const openvdb::GridBase& grid, const char* key) {
   return value->value();
 }
 
-IdVolume read_vdb(const std::filesystem::path& path) {
+IdVolume read_vdb(const std::string& bytes) {
+  const std::size_t header = kIdentifierAt + kZeroIdentifier.size();
+  if (bytes.size() < header) throw FileError("shorter than its header");
+  if (bytes.substr(kIdentifierAt, kZeroIdentifier.size()) != checksum_of(bytes)) {
+    throw FileError(
+        "its checksum differs: changed or cut short after it was written, or written by another program; OpenVDB "
+        "cannot read such files safely");
+  }
   openvdb::initialize();
-  openvdb::io::File file(path.string());
-  file.open(/*delayLoad=*/false);
-  const auto grid = openvdb::gridPtrCast<openvdb::Int32Grid>(file.readGrid(kGridName));
-  if (grid == nullptr) throw FileError(fmt::format("'{}' is not a grid of 32-bit integers", kGridName));
+  std::istringstream stream(bytes, std::ios::binary);
+  const openvdb::GridPtrVecPtr grids = openvdb::io::Stream(stream, /*delayLoad=*/false).getGrids();
+  const auto grid = grids->size() == 1 && grids->front()->getName() == kGridName
+                        ? openvdb::gridPtrCast<openvdb::Int32Grid>(grids->front())
+                        : nullptr;
+  if (grid == nullptr) throw FileError(fmt::format("'{}' is not its only grid, of 32-bit integers", kGridName));
 
   IdVolume volume;
   const openvdb::Vec3i size = required_metadata<openvdb::Vec3IMetadata>(*grid, kSizeKey);
@@ -150,18 +171,19 @@ void write_id_volume(const std::filesystem::path& path, const IdVolume& volume,
   assert(std::all_of(volume.ids.begin(), volume.ids.end(),
                      [](std::int32_t id) { return id >= kEmpty && id <= kMaxId; }));
   assert(volume.ids.size() == static_cast<std::size_t>(volume.size[0]) * volume.size[1] * volume.size[2]);
-  write_file_atomically(path, [&](const std::filesystem::path& temporary) {
-    try {
-      write_vdb(temporary, volume, metadata);
-    } catch (const std::exception& error) {
-      throw FileError(fmt::format("{}: cannot write: {}", path.string(), error.what()));
-    }
-  });
+  std::string bytes;
+  try {
+    bytes = vdb_bytes(volume, metadata);
+  } catch (const std::exception& error) {
+    throw FileError(fmt::format("{}: cannot write: {}", path.string(), error.what()));
+  }
+  write_file_atomically(path, bytes);
 }
 
 IdVolume read_id_volume(const std::filesystem::path& path) {
+  const std::vector<std::byte> bytes = read_whole_file(path);
   try {
-    return read_vdb(path);
+    return read_vdb({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
   } catch (const std::exception& error) {
     throw FileError(fmt::format("{}: cannot read as an id volume: {}", path.string(), error.what()));
   }

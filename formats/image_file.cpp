@@ -5,6 +5,7 @@
 #include <ImfCompression.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
+#include <ImfIO.h>
 #include <ImfInputFile.h>
 #include <ImfOutputFile.h>
 #include <ImfStandardAttributes.h>
@@ -53,7 +54,21 @@ Imf::Slice slice_of(Imf::PixelType type, const T* values, const Imath::Box2i& wi
   return Imf::Slice::Make(type, values, window, sizeof(T), sizeof(T) * static_cast<std::size_t>(width));
 }
 
-void write_exr_to(const std::filesystem::path& path, const Image& image) {
+/// OpenEXR writes into a file under construction, whose errors reach the caller even where the library swallows them.
+class OutputStream : public Imf::OStream {
+ public:
+  OutputStream(const std::string& name, AtomicFile& file) : Imf::OStream(name.c_str()), file_(&file) {}
+  void write(const char bytes[], int count) override {
+    file_->write(std::as_bytes(std::span(bytes, static_cast<std::size_t>(count))));
+  }
+  std::uint64_t tellp() override { return file_->position(); }
+  void seekp(std::uint64_t position) override { file_->seek(position); }
+
+ private:
+  AtomicFile* file_;
+};
+
+void write_exr_to(Imf::OStream& stream, const Image& image) {
   const Imath::Box2i window({0, 0}, {image.width - 1, image.height - 1});
   Imf::Header header(window, window);
   header.compression() = Imf::ZIP_COMPRESSION;
@@ -77,7 +92,7 @@ void write_exr_to(const std::filesystem::path& path, const Image& image) {
       pixels.insert(name, slice_of(type, channel.ids.data(), window, image.width));
     }
   }
-  Imf::OutputFile file(path.c_str(), header);
+  Imf::OutputFile file(stream, header);
   file.setFrameBuffer(pixels);
   file.writePixels(image.height);
 }
@@ -155,13 +170,15 @@ void write_exr(const std::filesystem::path& path, const Image& image) {
     assert((channel.type == ChannelType::kUint ? channel.ids.size() : channel.values.size()) ==
            static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height));
   }
-  write_file_atomically(path, [&](const std::filesystem::path& temporary) {
-    try {
-      write_exr_to(temporary, image);
-    } catch (const std::exception& error) {
-      throw FileError(fmt::format("{}: cannot write: {}", path.string(), error.what()));
-    }
-  });
+  AtomicFile file(path);
+  OutputStream stream(path.string(), file);
+  try {
+    write_exr_to(stream, image);
+  } catch (const std::exception& error) {
+    file.check();
+    throw FileError(fmt::format("{}: cannot write: {}", path.string(), error.what()));
+  }
+  file.commit();
 }
 
 Image read_exr(const std::filesystem::path& path) {

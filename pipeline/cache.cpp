@@ -1,29 +1,16 @@
 #include "pipeline/cache.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <cstdlib>
 #include <system_error>
 
 #include "formats/content_hash.h"
 #include "formats/input_error.h"
+#include "pipeline/artifact_record.h"
 
 namespace heddle {
-namespace {
-
 namespace fs = std::filesystem;
-
-/// Makes renames inside `folder` durable.
-void flush_folder(const fs::path& folder) {
-  const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (descriptor < 0) return;  // a file system that cannot open folders has nothing to flush
-  ::fsync(descriptor);
-  ::close(descriptor);
-}
-
-}  // namespace
 
 void make_folder(const fs::path& folder) {
   if (folder.empty()) return;
@@ -51,33 +38,8 @@ fs::path Cache::artifact(std::string_view stage, const std::string& key, std::st
   return folder_ / stage / (key + std::string(extension));
 }
 
-fs::path Cache::prepare(std::string_view stage, const std::string& key, std::string_view extension) const {
-  make_folder(folder_ / stage);
-  return artifact(stage, key, extension);
-}
-
-void Cache::publish_folder(std::string_view stage, const std::string& key,
-                           const std::function<void(const fs::path&)>& fill) const {
-  const fs::path target = prepare(stage, key, "");
-  const fs::path temporary = target.string() + fmt::format(".tmp.{}", ::getpid());
-  fs::remove_all(temporary);  // left by a killed process that had the same id
-  make_folder(temporary);
-  try {
-    fill(temporary);
-  } catch (...) {
-    fs::remove_all(temporary);
-    throw;
-  }
-  flush_folder(temporary);
-  std::error_code error;
-  fs::rename(temporary, target, error);
-  if (error) {
-    fs::remove_all(temporary);
-    // Another process published the same key first: its bytes are ours.
-    if (fs::exists(target)) return;
-    throw FileError(fmt::format("{}: cannot rename into place: {}", target.string(), error.message()));
-  }
-  flush_folder(target.parent_path());
+fs::path Cache::record(std::string_view stage, const std::string& key) const {
+  return artifact(stage, key, ".record.json");
 }
 
 PartialChunks::PartialChunks(const Cache& cache, std::string_view stage, const std::string& key)
@@ -87,9 +49,14 @@ fs::path PartialChunks::file(std::uint64_t first) const {
   return folder_ / fmt::format("{:010}.safetensors", first);
 }
 
-fs::path PartialChunks::prepare(std::uint64_t first) const {
-  make_folder(folder_);
-  return file(first);
+fs::path PartialChunks::record(std::uint64_t first) const {
+  return file(first).replace_extension(".record.json");
+}
+
+void PartialChunks::verify(std::uint64_t first) const {
+  const ArtifactCheck check = check_artifact(file(first), record(first));
+  if (check.state == ArtifactState::kAbsent) throw FileError(file(first).string() + ": vanished");
+  if (check.state == ArtifactState::kBroken) throw FileError(check.problem);
 }
 
 void PartialChunks::remove() const {

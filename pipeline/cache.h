@@ -1,19 +1,19 @@
 #ifndef HEDDLE_PIPELINE_CACHE_H_
 #define HEDDLE_PIPELINE_CACHE_H_
 // The cache of stage artifacts: a folder CACHE/STAGE/ per stage, an artifact named by its key, which is a hash of all
-// that went into it. An artifact that exists is complete (it was renamed into place) and never changes, so several
-// processes may share a cache: two that build the same key write the same bytes, and the last rename wins.
+// that went into it. An artifact appears whole (it is renamed into place), never changes, and is used only where it agrees
+// with its record (artifact_record.h). Several processes may share a cache: those that build the same key write the same
+// bytes.
 //
-//   CACHE/STAGE/KEY.safetensors (or .vdb, or a folder KEY/)    the artifact
-//   CACHE/STAGE/KEY.cost.json                                  what it took to build it (stages.h, StageCost)
-//   CACHE/STAGE/KEY.partial/FIRST.safetensors                  finished chunks of a long stage, kept until it is published
+//   CACHE/STAGE/KEY.safetensors (or .vdb, .json, or a folder KEY/)   the artifact
+//   CACHE/STAGE/KEY.record.json                                      its checksum, and what it took to build it
+//   CACHE/STAGE/KEY.partial/FIRST.safetensors, FIRST.record.json     finished chunks of a long stage, kept until it is published
 //
 // Default folder: $HEDDLE_CACHE, else out/cache below the working directory.
 // Errors: FileError with the system's reason. Tested in tests/pipeline/cache_test.cpp.
 
 #include <cstdint>
 #include <filesystem>
-#include <functional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -44,12 +44,7 @@ class Cache {
   /// extension with its dot; empty for an artifact that is a folder.
   std::filesystem::path artifact(std::string_view stage, const std::string& key, std::string_view extension) const;
 
-  /// Creates the stage's folder, so that artifact() can be written (atomically, by the caller).
-  std::filesystem::path prepare(std::string_view stage, const std::string& key, std::string_view extension) const;
-
-  /// For artifacts that are folders: `fill` writes into a temporary folder, which is then renamed to artifact().
-  void publish_folder(std::string_view stage, const std::string& key,
-                      const std::function<void(const std::filesystem::path& temporary)>& fill) const;
+  std::filesystem::path record(std::string_view stage, const std::string& key) const;
 
  private:
   std::filesystem::path folder_;
@@ -62,9 +57,11 @@ class PartialChunks {
 
   /// File of the chunk that starts at item `first`.
   std::filesystem::path file(std::uint64_t first) const;
+  std::filesystem::path record(std::uint64_t first) const;
   bool has(std::uint64_t first) const { return std::filesystem::exists(file(first)); }
-  /// Creates the folder, so that file() can be written (atomically, by the caller).
-  std::filesystem::path prepare(std::uint64_t first) const;
+  /// FileError where the chunk is absent or differs from its record.
+  void verify(std::uint64_t first) const;
+  bool folder_exists() const { return std::filesystem::exists(folder_); }
   /// Removes the folder; called once the artifact is published.
   void remove() const;
 

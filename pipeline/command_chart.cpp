@@ -6,6 +6,7 @@
 #include <set>
 
 #include "formats/atomic_file.h"
+#include "formats/content_hash.h"
 #include "formats/input_error.h"
 #include "pipeline/chart/chart.h"
 #include "pipeline/chart/chart_page.h"
@@ -13,6 +14,7 @@
 #include "pipeline/interrupt.h"
 #include "pipeline/job.h"
 #include "pipeline/picture_request.h"
+#include "pipeline/sealed_json.h"
 #include "pipeline/version.h"
 #include "render/flip.h"
 #include "render/render_output.h"
@@ -121,16 +123,21 @@ class ChartMaker {
   std::optional<Json> earlier_record(const std::string& key) const {
     const fs::path record_file = file(key + ".json");
     const bool may = options_->resume || made_.contains(key);
-    if (!may || !fs::exists(record_file) || !fs::exists(file(key + ".exr"))) return {};
-    const std::vector<std::byte> bytes = read_whole_file(record_file);
-    const auto* text = reinterpret_cast<const char*>(bytes.data());
-    Json record = Json::parse(text, text + bytes.size(), nullptr, false);
-    const bool usable = record.is_object() && record.value("threads", 0) == working_threads() &&
-                        record.value("processor", "") == processor_ &&
-                        record.value("program_version", "") == kProgramVersion && record.contains("render_seconds") &&
-                        record.contains("render_core_seconds");
-    if (!usable) return {};
-    return record;
+    if (!may || !fs::exists(record_file)) return {};
+    try {
+      Json record = read_sealed_json(record_file);
+      const bool same_machine = record.at("threads") == working_threads() && record.at("processor") == processor_ &&
+                                record.at("program_version") == kProgramVersion;
+      if (!same_machine) return {};
+      const Json& picture = record.at("picture");
+      verify_seal(file(key + ".exr"),
+                  {picture.at("bytes").get<std::uint64_t>(), picture.at("xxh3_128").get<std::string>()},
+                  record_file.filename().string());
+      return record;
+    } catch (const FileError& error) {
+      context_->console->warn(fmt::format("{}; rendered again", error.what()));
+      return {};
+    }
   }
 
   /// Renders a picture, or finds it; returns its record, which is written last.
@@ -149,14 +156,16 @@ class ChartMaker {
     write_png(file(key + ".png"), picture.image.width, picture.image.height,
               tone_map(layer_of(picture.image, "", key), 0));
     write_exr(file(key + ".exr"), picture.image);
+    const FileSeal seal = seal_of_file(file(key + ".exr"));
     const Json record = {{"key", key},
+                         {"picture", {{"bytes", seal.bytes}, {"xxh3_128", seal.xxh3_128}}},
                          {"program_version", kProgramVersion},
                          {"processor", processor_},
                          {"threads", working_threads()},
                          {"render_seconds", best.seconds},
                          {"render_core_seconds", best.core_seconds},
                          {"report", picture.report}};
-    write_file_atomically(file(key + ".json"), record.dump(2) + "\n");
+    write_sealed_json(file(key + ".json"), record);
     made_.insert(key);
     return record;
   }

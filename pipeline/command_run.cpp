@@ -1,8 +1,7 @@
 #include <fmt/format.h>
 
-#include <chrono>
-
 #include "formats/atomic_file.h"
+#include "pipeline/artifact_record.h"
 #include "pipeline/commands.h"
 #include "pipeline/job.h"
 #include "pipeline/picture_compare.h"
@@ -18,17 +17,23 @@ namespace fs = std::filesystem;
 void provide_picture(SceneJob& scene, const PictureRequest& request, const fs::path& target, Job& job) {
   const std::string title = target.stem().string();
   StageContext& context = job.context();
-  const std::string key = scene.picture_key(request);
-  const fs::path cached = context.cache.prepare("picture", key, ".exr");
-  StageResult result{.fabric = scene.config().name, .stage = title, .key = key, .artifact = cached};
-  if (!fs::exists(cached)) {
-    const auto start = std::chrono::steady_clock::now();
-    // The .exr is what says that the picture is there, so it is published last.
-    const PictureResult picture = scene.render(request, title);
-    write_picture_report(cached, picture);
-    write_exr(cached, picture.image);
+  Stage stage;
+  stage.name = "picture";
+  stage.key = scene.picture_key(request);
+  const fs::path folder = context.cache.artifact(stage.name, stage.key, "");
+  const fs::path cached = folder / "picture.exr";
+  StageResult result{.fabric = scene.config().name, .stage = title, .key = stage.key, .artifact = cached};
+  if (!is_sound(stage, context)) {
+    const Stopwatch watch;
+    publish_artifact(folder, context.cache.record(stage.name, stage.key), [&](const fs::path& temporary) {
+      const PictureResult picture = scene.render(request, title);
+      make_folder(temporary);
+      write_exr(temporary / cached.filename(), picture.image);
+      write_picture_report(temporary / cached.filename(), picture);
+      return BuildCost{watch.elapsed(), working_threads()};
+    });
     result.built = true;
-    result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    result.seconds = watch.elapsed().seconds;
   } else {
     const std::vector<std::byte> bytes = read_whole_file(fs::path(cached).replace_extension(".json"));
     const auto* text = reinterpret_cast<const char*>(bytes.data());

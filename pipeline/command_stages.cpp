@@ -9,17 +9,30 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Copies a pack out of the cache, the manifest last: a copy cut short is refused by its checksums.
+/// FileError where a pack may not take this place. Packs may be replaced, whole or cut short, but nothing else is lost.
+void require_pack_or_nothing(const fs::path& place) {
+  if (!fs::exists(place)) return;
+  if (!fs::is_directory(place)) throw FileError(place.string() + ": exists and is not a folder");
+  for (const auto& entry : fs::directory_iterator(place)) {
+    if (is_pack_file(entry.path().filename().native())) continue;
+    throw FileError(entry.path().string() +
+                    ": is no part of a pack, and would be lost with its folder; remove it or choose another name");
+  }
+}
+
+/// Copies a pack out of the cache: beside its place, then into it as a whole.
 void copy_pack(const fs::path& from, const fs::path& to) {
-  std::error_code error;
-  if (fs::exists(to) && !fs::is_empty(to, error) && !fs::exists(to / kManifestName)) {
-    throw FileError(to.string() + ": exists and is not a pack; remove it or choose another name");
+  // A last slash is no part of the name.
+  const fs::path place = to.has_filename() ? to : to.parent_path();
+  require_pack_or_nothing(place);
+  make_folder(place.parent_path());
+  TemporaryPath copy(place);
+  make_folder(copy.path());
+  for (const auto& entry : fs::directory_iterator(from)) {
+    write_file_atomically(copy.path() / entry.path().filename(), read_whole_file(entry.path()));
   }
-  make_folder(to);
-  for (const auto& [name, file] : read_verified_manifest(from).files) {
-    write_file_atomically(to / name, read_whole_file(from / name));
-  }
-  write_file_atomically(to / kManifestName, read_whole_file(from / kManifestName));
+  read_verified_manifest(copy.path());
+  copy.commit();
 }
 
 }  // namespace

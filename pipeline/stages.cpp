@@ -15,6 +15,7 @@
 #include "formats/id_volume_file.h"
 #include "formats/input_error.h"
 #include "formats/tensor_file.h"
+#include "pipeline/artifact_record.h"
 #include "pipeline/interrupt.h"
 #include "pipeline/plan/measure_accuracy.h"
 #include "pipeline/version.h"
@@ -55,41 +56,6 @@ TransferChunk read_transfer_chunk(const fs::path& path, std::uint32_t first_cell
   chunk.paths = file.get<std::uint32_t>("paths", {cells});
   chunk.cones = get_cones(file, cells, bands * bands);
   return chunk;
-}
-
-void write_cost(const fs::path& file, const WorkTime& time) {
-  const nlohmann::ordered_json cost = {{"seconds", time.seconds},
-                                       {"core_seconds", time.core_seconds},
-                                       {"threads", working_threads()},
-                                       {"program_version", kProgramVersion}};
-  write_file_atomically(file, cost.dump() + "\n");
-}
-
-/// seconds = -1 where there is no readable record.
-StageCost read_cost(const fs::path& file) {
-  StageCost cost;
-  cost.seconds = cost.core_seconds = -1;
-  if (!fs::exists(file)) return cost;
-  const std::vector<std::byte> bytes = read_whole_file(file);
-  const auto* text = reinterpret_cast<const char*>(bytes.data());
-  const auto record = nlohmann::json::parse(text, text + bytes.size(), nullptr, false);
-  if (record.is_discarded() || !record.is_object()) return cost;
-  const auto number = [&record](const char* key) {
-    const auto found = record.find(key);
-    return found != record.end() && found->is_number() ? found->get<double>() : -1.0;
-  };
-  cost.seconds = number("seconds");
-  cost.core_seconds = number("core_seconds");
-  cost.threads = static_cast<int>(number("threads"));
-  return cost;
-}
-
-fs::path cost_file(const Stage& stage, const Cache& cache) {
-  return cache.artifact(stage.name, stage.key, ".cost.json");
-}
-
-fs::path chunk_cost_file(fs::path chunk) {
-  return chunk.replace_extension(".cost.json");
 }
 
 /// Advances a progress of 100 items by the share done.
@@ -205,33 +171,45 @@ void StageContext::report(StageResult result) {
   results.push_back(std::move(result));
 }
 
+bool is_sound(const Stage& stage, StageContext& context) {
+  const fs::path path = context.cache.artifact(stage.name, stage.key, stage.extension);
+  if (context.sound.contains(path)) return true;
+  const ArtifactCheck check = check_artifact(path, context.cache.record(stage.name, stage.key));
+  if (check.state == ArtifactState::kBroken) context.console->warn(check.problem + "; it is built again");
+  if (check.state == ArtifactState::kSound) context.sound.insert(path);
+  return check.state == ArtifactState::kSound;
+}
+
 Artifact provide_artifact(const Stage& stage, const std::string& fabric, StageContext& context,
                           const std::function<void(const fs::path&, StageResult&)>& build) {
   const Artifact artifact{stage.key, context.cache.artifact(stage.name, stage.key, stage.extension)};
   StageResult result{.fabric = fabric, .stage = stage.name, .key = stage.key, .artifact = artifact.path};
-  if (!fs::exists(artifact.path)) {
+  if (!is_sound(stage, context)) {
     stop_if_interrupted();
     const WorkTime outer = std::exchange(context.nested, {});
     const Stopwatch watch;
-    context.cache.prepare(stage.name, stage.key, stage.extension);
-    build(artifact.path, result);
-    result.built = true;
-    const WorkTime whole = watch.elapsed();
-    const WorkTime own = whole - context.nested;
-    context.nested = outer + whole;
-    result.seconds = own.seconds;
-    write_cost(cost_file(stage, context.cache), own + result.earlier);
+    result.built = publish_artifact(artifact.path, context.cache.record(stage.name, stage.key), [&](const fs::path& path) {
+      build(path, result);
+      const WorkTime whole = watch.elapsed();
+      const WorkTime own = whole - context.nested;
+      context.nested = outer + whole;
+      result.seconds = own.seconds;
+      return BuildCost{own + result.earlier, working_threads()};
+    });
+    context.sound.insert(artifact.path);
   }
   context.report(std::move(result));
   return artifact;
 }
 
 StageCost recorded_cost(const Stage& stage, const Cache& cache) {
-  StageCost cost = read_cost(cost_file(stage, cache));
-  cost.stage = stage.name;
-  cost.key = stage.key;
-  cost.present = fs::exists(cache.artifact(stage.name, stage.key, stage.extension));
-  return cost;
+  const BuildCost cost = recorded_build_cost(cache.record(stage.name, stage.key));
+  return {.stage = stage.name,
+          .key = stage.key,
+          .seconds = cost.time.seconds,
+          .core_seconds = cost.time.core_seconds,
+          .threads = cost.threads,
+          .present = fs::exists(cache.artifact(stage.name, stage.key, stage.extension))};
 }
 
 Artifact FabricStages::artifact_of(const Stage& stage,
@@ -289,8 +267,27 @@ Artifact FabricStages::synth() {
   });
 }
 
+/// Publishes one chunk. The process that publishes the artifact removes the chunks' folder, whoever writes there.
 template <class Compute>
-void FabricStages::finish_chunks(const Stage& stage, std::uint32_t items, std::uint32_t per_chunk,
+bool FabricStages::publish_chunk(const Stage& stage, std::uint32_t first, std::uint32_t end, Compute&& compute) {
+  const PartialChunks chunks(context_->cache, stage.name, stage.key);
+  while (!is_sound(stage, *context_)) {
+    const Stopwatch watch;
+    try {
+      publish_artifact(chunks.file(first), chunks.record(first), [&](const fs::path& file) {
+        compute(file, first, end);
+        return BuildCost{watch.elapsed(), working_threads()};
+      });
+      return true;
+    } catch (const FileError&) {
+      if (!is_sound(stage, *context_) && chunks.folder_exists()) throw;
+    }
+  }
+  return false;
+}
+
+template <class Compute>
+bool FabricStages::finish_chunks(const Stage& stage, std::uint32_t items, std::uint32_t per_chunk,
                                  const std::string& unit, Shard shard, StageResult& result, Compute&& compute) {
   const PartialChunks chunks(context_->cache, stage.name, stage.key);
   std::vector<std::uint32_t> missing;
@@ -302,8 +299,8 @@ void FabricStages::finish_chunks(const Stage& stage, std::uint32_t items, std::u
     items_of_shard += size;
     if (chunks.has(first)) {
       ++result.resumed;
-      const StageCost cost = read_cost(chunk_cost_file(chunks.file(first)));
-      if (cost.seconds > 0) result.earlier = result.earlier + WorkTime{cost.seconds, cost.core_seconds};
+      const BuildCost cost = recorded_build_cost(chunks.record(first));
+      if (cost.time.seconds > 0) result.earlier = result.earlier + cost.time;
       items_done += size;
     } else {
       missing.push_back(first);
@@ -313,31 +310,32 @@ void FabricStages::finish_chunks(const Stage& stage, std::uint32_t items, std::u
   for (const std::uint32_t first : missing) {
     stop_if_interrupted();
     const std::uint32_t size = std::min(per_chunk, items - first);
-    const Stopwatch watch;
-    const fs::path file = chunks.prepare(first);
-    compute(file, first, first + size);
-    write_cost(chunk_cost_file(file), watch.elapsed());
+    if (!publish_chunk(stage, first, first + size, compute)) return false;
     ++result.chunks;
     progress.advance(size);
   }
+  return true;
 }
 
-/// read(file, first, end) for all chunks in order; a chunk that cannot be read is computed again.
+/// read(file, first, end) for all chunks in order; a chunk that is broken or has vanished is computed again.
 template <class Compute, class Read>
-void FabricStages::read_chunks(const Stage& stage, std::uint32_t items, std::uint32_t per_chunk, Compute&& compute,
+bool FabricStages::read_chunks(const Stage& stage, std::uint32_t items, std::uint32_t per_chunk, Compute&& compute,
                                Read&& read) {
   const PartialChunks chunks(context_->cache, stage.name, stage.key);
   for (std::uint32_t first = 0; first < items; first += per_chunk) {
     const std::uint32_t end = std::min(first + per_chunk, items);
     const fs::path file = chunks.file(first);
     try {
+      chunks.verify(first);
       read(file, first, end);
     } catch (const FileError& error) {
-      context_->console->warn(fmt::format("{}; computing this chunk again", error.what()));
-      compute(file, first, end);
+      if (is_sound(stage, *context_)) return false;
+      context_->console->warn(fmt::format("{}; this chunk is computed again", error.what()));
+      if (!publish_chunk(stage, first, end, compute)) return false;
       read(file, first, end);
     }
   }
+  return true;
 }
 
 /// A shard's own line in the report; nothing is published.
@@ -347,7 +345,7 @@ void FabricStages::run_shard(const Stage& stage, Work&& work) {
                      .stage = stage.name,
                      .key = stage.key,
                      .artifact = context_->cache.artifact(stage.name, stage.key, stage.extension)};
-  if (!fs::exists(result.artifact)) {
+  if (!is_sound(stage, *context_)) {
     const Stopwatch watch;
     work(result);
     result.built = result.chunks > 0;
@@ -373,25 +371,26 @@ void FabricStages::compute_maps(const Stage& stage, const fs::path& file, std::u
 
 Artifact FabricStages::maps() {
   const Stage stage = maps_stage();
-  return artifact_of(stage, [&](const fs::path& path, StageResult& result) {
+  const Artifact artifact = artifact_of(stage, [&](const fs::path& path, StageResult& result) {
     const auto segments = static_cast<std::uint32_t>(exemplar().segment_count());
     const auto compute = [&](const fs::path& file, std::uint32_t first, std::uint32_t end) {
       compute_maps(stage, file, first, end);
     };
-    finish_chunks(stage, segments, kSegmentsPerChunk, "segments", Shard{}, result, compute);
     VisibilityMaps all;
     all.both_sides = document_.config.light_from_both_sides;
-    read_chunks(
-        stage, segments, kSegmentsPerChunk, compute, [&](const fs::path& file, std::uint32_t first, std::uint32_t end) {
-          const VisibilityMaps chunk = read_visibility_maps(file);
-          if (chunk.first_segment != first || chunk.count() != end - first || chunk.both_sides != all.both_sides) {
-            throw FileError(file.string() + ": not the chunk that its name says");
-          }
-          all.append(chunk);
-        });
+    const auto read = [&](const fs::path& file, std::uint32_t first, std::uint32_t end) {
+      const VisibilityMaps chunk = read_visibility_maps(file);
+      if (chunk.first_segment != first || chunk.count() != end - first || chunk.both_sides != all.both_sides) {
+        throw FileError(file.string() + ": not the chunk that its name says");
+      }
+      all.append(chunk);
+    };
+    if (!finish_chunks(stage, segments, kSegmentsPerChunk, "segments", Shard{}, result, compute)) return;
+    if (!read_chunks(stage, segments, kSegmentsPerChunk, compute, read)) return;
     write_visibility_maps(path, all, stage.metadata);
-    PartialChunks(context_->cache, stage.name, stage.key).remove();
   });
+  PartialChunks(context_->cache, stage.name, stage.key).remove();
+  return artifact;
 }
 
 void FabricStages::visibility_shard(Shard shard) {
@@ -444,7 +443,7 @@ TransferSettings FabricStages::transfer_settings(std::optional<int> order) const
 }
 
 Stage FabricStages::transfer_stage(const TransferSettings& settings) {
-  std::vector<std::pair<std::string, std::string>> upstream = {{"fibers", synth().key},
+  std::vector<std::pair<std::string, std::string>> upstream = {{"fibers", synth_stage().key},
                                                                {"order", fmt::format("{}", settings.order)},
                                                                {"light_from", light_from()},
                                                                {"seed", fmt::format("{}", settings.seed)}};
@@ -478,25 +477,26 @@ std::unique_ptr<FabricStages::TransferWork> FabricStages::transfer_work(const Tr
 Artifact FabricStages::transfer(std::optional<int> order) {
   const TransferSettings settings = transfer_settings(order);
   const Stage stage = transfer_stage(settings);
-  return artifact_of(stage, [&](const fs::path& path, StageResult& result) {
+  const Artifact artifact = artifact_of(stage, [&](const fs::path& path, StageResult& result) {
     const auto work = transfer_work(settings);
     const std::uint32_t cells = work->baker->cell_count();
     const auto compute = [&](const fs::path& file, std::uint32_t first, std::uint32_t end) {
       work->compute(file, first, end);
     };
-    finish_chunks(stage, cells, kCellsPerChunk, "cells", Shard{}, result, compute);
     std::vector<TransferChunk> chunks;
-    read_chunks(stage, cells, kCellsPerChunk, compute,
-                [&](const fs::path& file, std::uint32_t first, std::uint32_t end) {
-                  chunks.push_back(read_transfer_chunk(file, first, end - first, settings.order));
-                });
+    const auto read = [&](const fs::path& file, std::uint32_t first, std::uint32_t end) {
+      chunks.push_back(read_transfer_chunk(file, first, end - first, settings.order));
+    };
+    if (!finish_chunks(stage, cells, kCellsPerChunk, "cells", Shard{}, result, compute)) return;
+    if (!read_chunks(stage, cells, kCellsPerChunk, compute, read)) return;
     write_transfer(path, work->baker->assemble(chunks), stage.metadata);
-    PartialChunks(context_->cache, stage.name, stage.key).remove();
   });
+  PartialChunks(context_->cache, stage.name, stage.key).remove();
+  return artifact;
 }
 
 Stage FabricStages::volume_stage() {
-  return make_stage("voxelize", 1, ".vdb", document_.volume_text, {{"geometry", geometry_key()}});
+  return make_stage("voxelize", 2, ".vdb", document_.volume_text, {{"geometry", geometry_key()}});
 }
 
 Artifact FabricStages::volume() {
@@ -507,32 +507,39 @@ Artifact FabricStages::volume() {
 }
 
 Artifact FabricStages::pack(const Needs& needs) {
-  std::vector<std::pair<std::string, Artifact>> parts = {{"fibers.safetensors", synth()}};
-  if (needs.ssdf) parts.emplace_back("ssdf.safetensors", ssdf());
-  if (needs.sgs) parts.emplace_back("sg.safetensors", sgs());
-  if (needs.transfer) parts.emplace_back("transfer.safetensors", transfer(needs.order));
-  if (needs.volume) parts.emplace_back("volume.vdb", volume());
-
-  std::vector<std::pair<std::string, std::string>> upstream;
-  for (const auto& [file, artifact] : parts) upstream.emplace_back(file, artifact.key);
+  std::vector<std::pair<std::string, std::string>> upstream = {{"fibers.safetensors", synth_stage().key}};
+  if (needs.ssdf) upstream.emplace_back("ssdf.safetensors", ssdf_stage().key);
+  if (needs.sgs) upstream.emplace_back("sg.safetensors", sg_stage().key);
+  if (needs.transfer) {
+    upstream.emplace_back("transfer.safetensors", transfer_stage(transfer_settings(needs.order)).key);
+  }
+  if (needs.volume) upstream.emplace_back("volume.vdb", volume_stage().key);
   upstream.emplace_back("light_from", light_from());
   const Stage stage = make_stage("pack", 1, "", document_.config.name, std::move(upstream));
-  return artifact_of(stage, [&](const fs::path&, StageResult&) {
-    context_->cache.publish_folder("pack", stage.key, [&](const fs::path& folder) {
-      PackManifest manifest;
-      manifest.name = document_.config.name;
-      manifest.key = stage.key;
-      manifest.program_version = kProgramVersion;
-      manifest.light_from_both_sides = document_.config.light_from_both_sides;
-      manifest.counts = {{"fibers", exemplar().fiber_count()}, {"segments", exemplar().segment_count()}};
-      for (const auto& [file, artifact] : parts) {
-        write_file_atomically(folder / file, read_whole_file(artifact.path));
-        manifest.files[file] = {};
-      }
-      if (needs.transfer) manifest.counts["cells"] = read_transfer(folder / "transfer.safetensors").cell_count();
-      write_manifest(folder, std::move(manifest));
-    });
-  });
+  return artifact_of(stage, [&](const fs::path& folder, StageResult&) { fill_pack(folder, stage.key, needs); });
+}
+
+void FabricStages::fill_pack(const fs::path& folder, const std::string& key, const Needs& needs) {
+  PackManifest manifest;
+  manifest.name = document_.config.name;
+  manifest.key = key;
+  manifest.program_version = kProgramVersion;
+  manifest.light_from_both_sides = document_.config.light_from_both_sides;
+  manifest.counts = {{"fibers", exemplar().fiber_count()}, {"segments", exemplar().segment_count()}};
+  make_folder(folder);
+  const auto add = [&](const char* name, const Artifact& artifact) {
+    write_file_atomically(folder / name, read_whole_file(artifact.path));
+    manifest.files[name] = {};
+  };
+  add("fibers.safetensors", synth());
+  if (needs.ssdf) add("ssdf.safetensors", ssdf());
+  if (needs.sgs) add("sg.safetensors", sgs());
+  if (needs.transfer) {
+    add("transfer.safetensors", transfer(needs.order));
+    manifest.counts["cells"] = read_transfer(folder / "transfer.safetensors").cell_count();
+  }
+  if (needs.volume) add("volume.vdb", volume());
+  write_manifest(folder, std::move(manifest));
 }
 
 Stage FabricStages::accuracy_stage(const SurfaceFabric* surface) {

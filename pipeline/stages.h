@@ -25,6 +25,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -85,6 +86,7 @@ struct StageContext {
   std::optional<std::uint64_t> seed;  // in place of the fabric's
   std::vector<StageResult> results;
   WorkTime nested = {};  // spent by stages that the running stage asked for
+  std::set<std::filesystem::path> sound = {};  // artifacts that this command has verified or built
 
   /// Says how a stage went, once per key, and notes it for the report.
   void report(StageResult result);
@@ -97,7 +99,7 @@ struct FabricVariant {
   auto operator<=>(const FabricVariant&) const = default;
 };
 
-/// What it took to build an artifact, without what it read. Kept beside it as KEY.cost.json.
+/// What it took to build an artifact, without what it read, as its record says.
 struct StageCost {
   std::string stage;
   std::string key;
@@ -138,7 +140,12 @@ struct Stage {
 Stage make_stage(std::string name, int version, std::string extension, const std::string& config,
                  std::vector<std::pair<std::string, std::string>> upstream);
 
-/// The stage's artifact; where the cache lacks it, build(path, result) writes it, atomically. `fabric`: for the report.
+/// Is the artifact in the cache, and as it was written? Reads all of it the first time. A broken one is named on the
+/// console.
+bool is_sound(const Stage& stage, StageContext& context);
+
+/// The stage's artifact; where the cache lacks it or holds a broken one, build(path, result) makes it under a temporary
+/// path, or makes nothing where another process has published it meanwhile. `fabric`: for the report.
 Artifact provide_artifact(const Stage& stage, const std::string& fabric, StageContext& context,
                           const std::function<void(const std::filesystem::path&, StageResult&)>& build);
 
@@ -186,14 +193,18 @@ class FabricStages {
   struct TransferWork;
   Artifact artifact_of(const Stage& stage,
                        const std::function<void(const std::filesystem::path&, StageResult&)>& build);
+  void fill_pack(const std::filesystem::path& folder, const std::string& key, const Needs& needs);
   template <class Work>
   void run_shard(const Stage& stage, Work&& work);
-  /// compute(file, first, end) for those of the shard's chunks that are not on disk.
   template <class Compute>
-  void finish_chunks(const Stage& stage, std::uint32_t items, std::uint32_t per_chunk, const std::string& unit,
+  bool publish_chunk(const Stage& stage, std::uint32_t first, std::uint32_t end, Compute&& compute);
+  /// compute(file, first, end) for those of the shard's chunks that are not on disk. False, as from the other two, where
+  /// another process has published the artifact meanwhile.
+  template <class Compute>
+  bool finish_chunks(const Stage& stage, std::uint32_t items, std::uint32_t per_chunk, const std::string& unit,
                      Shard shard, StageResult& result, Compute&& compute);
   template <class Compute, class Read>
-  void read_chunks(const Stage& stage, std::uint32_t items, std::uint32_t per_chunk, Compute&& compute, Read&& read);
+  bool read_chunks(const Stage& stage, std::uint32_t items, std::uint32_t per_chunk, Compute&& compute, Read&& read);
 
   const Exemplar& exemplar();
   const TileScene& scene();

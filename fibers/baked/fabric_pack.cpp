@@ -9,7 +9,6 @@
 
 #include "fibers/cloth/bundle_tangents.h"
 #include "formats/atomic_file.h"
-#include "formats/content_hash.h"
 #include "formats/input_error.h"
 
 namespace heddle {
@@ -24,6 +23,10 @@ constexpr std::uintmax_t kMaxManifestBytes = 1 << 20;
 
 constexpr std::array<std::string_view, 5> kKnownFiles = {"fibers.safetensors", "ssdf.safetensors", "sg.safetensors",
                                                          "transfer.safetensors", "volume.vdb"};
+
+bool is_known_file(std::string_view name) {
+  return std::find(kKnownFiles.begin(), kKnownFiles.end(), name) != kKnownFiles.end();
+}
 
 /// Checksum of everything in the manifest but the checksum itself.
 std::string manifest_checksum(Json document) {
@@ -85,36 +88,22 @@ PackManifest read_manifest(const std::filesystem::path& folder) {
   }
 }
 
-void verify_file(const std::filesystem::path& path, const PackFile& expected) {
-  std::error_code error;
-  const std::uintmax_t size = std::filesystem::file_size(path, error);
-  if (error) throw FileError(fmt::format("{}: named in {} but: {}", path.string(), kManifestName, error.message()));
-  if (size != expected.bytes) {
-    throw FileError(fmt::format("{}: {} bytes, {} says {}: truncated or replaced", path.string(), size, kManifestName,
-                                expected.bytes));
-  }
-  const std::string found = content_hash_of_file(path);
-  if (found != expected.xxh3_128) {
-    throw FileError(
-        fmt::format("{}: checksum {}, {} says {}: corrupt", path.string(), found, kManifestName, expected.xxh3_128));
-  }
-}
-
 }  // namespace
 
 void write_manifest(const std::filesystem::path& folder, PackManifest manifest) {
-  for (auto& [name, file] : manifest.files) {
-    file.bytes = std::filesystem::file_size(folder / name);
-    file.xxh3_128 = content_hash_of_file(folder / name);
-  }
+  for (auto& [name, seal] : manifest.files) seal = seal_of_file(folder / name);
   write_file_atomically(folder / kManifestName, to_json(manifest).dump(2) + "\n");
+}
+
+bool is_pack_file(std::string_view name) {
+  return name == kManifestName || is_known_file(name);
 }
 
 PackManifest read_verified_manifest(const std::filesystem::path& folder) {
   PackManifest manifest = read_manifest(folder);
   for (const auto& [name, file] : manifest.files) {
     // A closed list of names also keeps paths such as "../x" out.
-    if (std::find(kKnownFiles.begin(), kKnownFiles.end(), name) == kKnownFiles.end()) {
+    if (!is_known_file(name)) {
       throw FileError(fmt::format("{}: names a file that is no part of a pack: {}", (folder / kManifestName).string(),
                                   Json(name).dump()));
     }
@@ -122,7 +111,7 @@ PackManifest read_verified_manifest(const std::filesystem::path& folder) {
   if (!manifest.files.contains("fibers.safetensors")) {
     throw FileError((folder / kManifestName).string() + ": names no fibers.safetensors");
   }
-  for (const auto& [name, file] : manifest.files) verify_file(folder / name, file);
+  for (const auto& [name, seal] : manifest.files) verify_seal(folder / name, seal, kManifestName);
   return manifest;
 }
 

@@ -15,22 +15,19 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "fibers/baked/segment_visibility.h"
 #include "fibers/baked/transfer.h"
 #include "fibers/cloth/exemplar.h"
 #include "fibers/scattering/bcsdf_table.h"
+#include "formats/content_hash.h"
 #include "formats/id_volume_file.h"
 
 namespace heddle {
 
 inline constexpr char kManifestName[] = "manifest.json";
-
-struct PackFile {
-  std::uint64_t bytes = 0;
-  std::string xxh3_128;  // 32 hexadecimal digits
-};
 
 struct PackManifest {
   std::string name;             // of the fabric
@@ -38,7 +35,7 @@ struct PackManifest {
   std::string program_version;  // that wrote it
   bool light_from_both_sides = false;
   std::map<std::string, std::uint64_t> counts;  // "fibers", "segments", "cells"; for people and for `heddle check`
-  std::map<std::string, PackFile> files;        // by file name, without the manifest
+  std::map<std::string, FileSeal> files;        // by file name, without the manifest
 };
 
 struct FabricPack {
@@ -58,6 +55,9 @@ struct FabricPack {
 /// Hashes the files named in `manifest.files` inside `folder` (their sizes and checksums are filled in) and writes
 /// manifest.json, atomically, last.
 void write_manifest(const std::filesystem::path& folder, PackManifest manifest);
+
+/// Is this the name of a file that a pack may hold, the manifest included?
+bool is_pack_file(std::string_view name);
 
 /// Reads manifest.json and makes checks 1 to 4.
 PackManifest read_verified_manifest(const std::filesystem::path& folder);

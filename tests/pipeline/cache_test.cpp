@@ -4,10 +4,10 @@
 
 #include <cstdlib>
 #include <set>
-#include <thread>
 
 #include "formats/atomic_file.h"
 #include "formats/input_error.h"
+#include "pipeline/artifact_record.h"
 #include "tests/support/temporary_folder.h"
 
 namespace heddle {
@@ -54,53 +54,28 @@ TEST(Cache, DefaultFolderFollowsTheEnvironment) {
   EXPECT_EQ(default_cache_folder(), "out/cache");
 }
 
-TEST(Cache, FolderArtifactsAppearWholeOrNotAtAll) {
-  const TemporaryFolder temporary;
-  const Cache cache(temporary.path());
-  const fs::path target = cache.artifact("pack", "k", "");
-  EXPECT_THROW(cache.publish_folder("pack", "k",
-                                    [&](const fs::path& folder) {
-                                      write_file_atomically(folder / "a", "1");
-                                      EXPECT_FALSE(fs::exists(target));
-                                      throw FileError("disk full");
-                                    }),
-               FileError);
-  EXPECT_TRUE(names_in(temporary.path() / "pack").empty());
-
-  cache.publish_folder("pack", "k", [](const fs::path& folder) { write_file_atomically(folder / "a", "1"); });
-  EXPECT_EQ(names_in(temporary.path() / "pack"), std::vector<std::string>{"k"});
-  EXPECT_EQ(names_in(target), std::vector<std::string>{"a"});
-
-  // A second process that built the same key meanwhile: the first stays, nothing is left over.
-  cache.publish_folder("pack", "k", [](const fs::path& folder) { write_file_atomically(folder / "a", "1"); });
-  EXPECT_EQ(names_in(temporary.path() / "pack"), std::vector<std::string>{"k"});
-}
-
 TEST(Cache, ChunksStayUntilRemoved) {
   const TemporaryFolder temporary;
   const Cache cache(temporary.path());
   const PartialChunks chunks(cache, "transfer", "k");
   EXPECT_FALSE(chunks.has(0));
-  write_file_atomically(chunks.prepare(0), "0");
-  write_file_atomically(chunks.prepare(1024), "1");
+  EXPECT_FALSE(chunks.folder_exists());
+  for (const std::uint64_t first : {0, 1024}) {
+    publish_artifact(chunks.file(first), chunks.record(first), [](const fs::path& file) {
+      write_file_atomically(file, "chunk");
+      return BuildCost{};
+    });
+  }
   EXPECT_TRUE(chunks.has(0));
   EXPECT_TRUE(PartialChunks(cache, "transfer", "k").has(1024));
   EXPECT_FALSE(PartialChunks(cache, "transfer", "other").has(0));
+  EXPECT_NO_THROW(chunks.verify(1024));
+  write_file_atomically(chunks.file(1024), "chunk that was changed");
+  EXPECT_THROW(chunks.verify(1024), FileError);
+  EXPECT_THROW(chunks.verify(2048), FileError);
   chunks.remove();
   EXPECT_FALSE(chunks.has(0));
   EXPECT_TRUE(names_in(temporary.path() / "transfer").empty());
-}
-
-TEST(Cache, UnwritableFolderIsNamed) {
-  const TemporaryFolder temporary;
-  write_file_atomically(temporary.path() / "file", "x");
-  const Cache cache(temporary.path() / "file");
-  try {
-    cache.prepare("synth", "k", ".safetensors");
-    FAIL() << "a file taken for a folder";
-  } catch (const FileError& error) {
-    EXPECT_NE(std::string(error.what()).find("file/synth"), std::string::npos) << error.what();
-  }
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 #include <sstream>
 
 #include "formats/image_file.h"
+#include "pipeline/artifact_record.h"
 #include "pipeline/picture_request.h"
 #include "pipeline/plan/accuracy_table.h"
 #include "pipeline/scene_job.h"
@@ -128,7 +129,7 @@ TEST(StagesEndToEnd, SameBytesHoweverTheJobIsRun) {
   {
     SCOPED_TRACE("warm cache");
     const Json warm = shop.report({"precompute", "fabric.toml"});
-    EXPECT_GE(warm.at("stages").size(), 5U);
+    EXPECT_EQ(warm.at("stages").size(), 2U) << "the fibers and the pack; what the pack holds is not asked for";
     for (const Json& stage : warm.at("stages")) EXPECT_FALSE(stage.at("built").get<bool>()) << stage.dump();
   }
   {
@@ -565,8 +566,10 @@ void store_table(const Workshop& shop, double bias) {
                                                                    {"voxelize, voxels x 0.5", 0.01}}) {
     table.costs[part] = {seconds, seconds};
   }
-  make_folder(path.parent_path());
-  write_accuracy(path, table);
+  publish_artifact(path, fs::path(path).replace_extension(".record.json"), [&](const fs::path& file) {
+    write_accuracy(file, table);
+    return BuildCost{};
+  });
 }
 
 Json plan_of(const Workshop& shop, const char* tolerance, int status) {

@@ -1,0 +1,85 @@
+#include "pipeline/artifact_record.h"
+
+#include <fmt/format.h>
+
+#include <map>
+
+#include "formats/atomic_file.h"
+#include "formats/content_hash.h"
+#include "formats/input_error.h"
+#include "pipeline/cache.h"
+#include "pipeline/sealed_json.h"
+#include "pipeline/version.h"
+
+namespace heddle {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+
+/// The files of an artifact, by name inside its folder; one without a name where the artifact is a file.
+using Seals = std::map<std::string, FileSeal>;
+
+Seals seals_of(const fs::path& artifact) {
+  if (!fs::is_directory(artifact)) return {{"", seal_of_file(artifact)}};
+  Seals seals;
+  for (const auto& entry : fs::directory_iterator(artifact)) {
+    seals[entry.path().filename().string()] = seal_of_file(entry.path());
+  }
+  return seals;
+}
+
+Json record_json(const Seals& seals, const BuildCost& cost) {
+  Json files = Json::object();
+  for (const auto& [name, seal] : seals) files[name] = {{"bytes", seal.bytes}, {"xxh3_128", seal.xxh3_128}};
+  return {{"files", files},
+          {"seconds", cost.time.seconds},
+          {"core_seconds", cost.time.core_seconds},
+          {"threads", cost.threads},
+          {"program_version", kProgramVersion}};
+}
+
+}  // namespace
+
+BuildCost recorded_build_cost(const fs::path& record_file) {
+  try {
+    const Json record = read_sealed_json(record_file);
+    return {{record.at("seconds").get<double>(), record.at("core_seconds").get<double>()},
+            record.at("threads").get<int>()};
+  } catch (const std::exception&) {
+    return {};
+  }
+}
+
+ArtifactCheck check_artifact(const fs::path& artifact, const fs::path& record_file) {
+  if (!fs::exists(artifact)) return {};
+  try {
+    const Json record = read_sealed_json(record_file);
+    for (const auto& [name, seal] : record.at("files").items()) {
+      verify_seal(name.empty() ? artifact : artifact / name,
+                  {seal.at("bytes").get<std::uint64_t>(), seal.at("xxh3_128").get<std::string>()},
+                  record_file.filename().string());
+    }
+  } catch (const std::exception& error) {
+    return {ArtifactState::kBroken, error.what()};
+  }
+  return {ArtifactState::kSound, {}};
+}
+
+bool publish_artifact(const fs::path& artifact, const fs::path& record_file,
+                      const std::function<BuildCost(const fs::path&)>& build) {
+  make_folder(artifact.parent_path());
+  TemporaryPath temporary(artifact);
+  const BuildCost cost = build(temporary.path());
+  const bool built = fs::exists(temporary.path());
+  const ArtifactCheck meanwhile = check_artifact(artifact, record_file);
+  if (meanwhile.state == ArtifactState::kSound) return built;
+  if (!built) throw FileError(fmt::format("{}: vanished while it was waited for", artifact.string()));
+  write_sealed_json(record_file, record_json(seals_of(temporary.path()), cost));
+  std::error_code error;
+  if (fs::is_directory(artifact) != fs::is_directory(temporary.path())) fs::remove_all(artifact, error);
+  temporary.commit();
+  return true;
+}
+
+}  // namespace heddle

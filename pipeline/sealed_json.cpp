@@ -1,0 +1,37 @@
+#include "pipeline/sealed_json.h"
+
+#include <string_view>
+#include <vector>
+
+#include "formats/atomic_file.h"
+#include "formats/content_hash.h"
+#include "formats/input_error.h"
+#include "formats/json_text.h"
+
+namespace heddle {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr char kSeal[] = "seal";
+
+}  // namespace
+
+void write_sealed_json(const std::filesystem::path& path, Json document) {
+  document[kSeal] = content_hash(document.dump());
+  write_file_atomically(path, document.dump(1) + "\n");
+}
+
+Json read_sealed_json(const std::filesystem::path& path) {
+  const std::vector<std::byte> bytes = read_whole_file(path);
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  Json document = is_nested_too_deeply(text) ? Json() : Json::parse(text, nullptr, false);
+  if (document.is_object() && document.contains(kSeal)) {
+    const Json seal = document.at(kSeal);
+    document.erase(kSeal);
+    if (seal == content_hash(document.dump(-1, ' ', false, Json::error_handler_t::replace))) return document;
+  }
+  throw FileError(path.string() + ": corrupt (its own checksum differs)");
+}
+
+}  // namespace heddle
