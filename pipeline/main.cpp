@@ -108,6 +108,35 @@ void add_stage_command(CLI::App& app, Options& options, const std::string& name,
   command->callback([&options, target] { options.stage.target = target; });
 }
 
+/// What is left of a command's work when a signal ends it, as a sentence for users.
+const char* kept_after_signal(const std::string& command) {
+  constexpr char kStages[] = "finished stages and chunks are kept in the cache, and the same command goes on from them";
+  constexpr char kMeasurement[] =
+      "nothing of the measurement is kept; finished stages and chunks are, in the cache";
+  constexpr char kNothing[] = "nothing was written";
+  static const std::map<std::string, const char*> kept = {
+      {"accuracy", kMeasurement},
+      {"chart",
+       "finished pictures are kept in the chart's folder runs, and the same command with --resume goes on from them; "
+       "finished stages and chunks are kept in the cache"},
+      {"check", kNothing},
+      {"compare", kNothing},
+      {"eval", "the answers printed so far hold"},
+      {"info", kNothing},
+      {"pack", kStages},
+      {"plan", kMeasurement},
+      {"precompute", kStages},
+      {"render", "nothing of the picture is kept; finished stages and chunks of its fabrics are, in the cache"},
+      {"run",
+       "finished pictures, stages and chunks are kept in the cache, and the same command goes on from them; nothing "
+       "is kept of a picture that was being rendered"},
+      {"synth", kStages},
+      {"transfer", kStages},
+      {"visibility", kStages},
+  };
+  return kept.at(command);
+}
+
 /// Declares all subcommands and returns what each of them does.
 std::map<std::string, std::function<int()>> add_commands(CLI::App& app, Options& options) {
   std::map<std::string, std::function<int()>> actions;
@@ -249,27 +278,37 @@ int main_program(int argc, char** argv) {
     limit = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism,
                                                   static_cast<std::size_t>(options.threads));
   }
-  install_interrupt_handler();
-  const int status = actions.at(app.get_subcommands().front()->get_name())();
+  const std::string command = app.get_subcommands().front()->get_name();
+  watch_for_signals(kept_after_signal(command));
+  const int status = actions.at(command)();
   std::cout.flush();
   if (!std::cout) throw FileError("standard output: cannot be written");
   return status;
+}
+
+struct ProgramEnd {
+  int status;
+  std::string message;  // empty where all is well
+};
+
+ProgramEnd run_program(int argc, char** argv) {
+  try {
+    return {main_program(argc, argv), ""};
+  } catch (const Interrupted& interrupted) {
+    return {interrupted.exit_status(), interrupted.what()};
+  } catch (const ConfigError& error) {
+    return {kWrongUsage, error.what()};
+  } catch (const std::exception& error) {
+    return {kFailed, error.what()};
+  }
 }
 
 }  // namespace
 }  // namespace heddle
 
 int main(int argc, char** argv) {
-  try {
-    return heddle::main_program(argc, argv);
-  } catch (const heddle::Interrupted& interrupted) {
-    std::cerr << "heddle: " << interrupted.what() << '\n';
-    return interrupted.exit_status();
-  } catch (const heddle::ConfigError& error) {
-    std::cerr << "heddle: " << error.what() << '\n';
-    return heddle::kWrongUsage;
-  } catch (const std::exception& error) {
-    std::cerr << "heddle: " << error.what() << '\n';
-    return heddle::kFailed;
-  }
+  const heddle::ProgramEnd end = heddle::run_program(argc, argv);
+  heddle::claim_end_of_process();
+  if (!end.message.empty()) std::cerr << "heddle: " << end.message << '\n';
+  return end.status;
 }

@@ -35,7 +35,9 @@ struct ProgramResult {
 /// A started program; standard output and error go to files in `folder`.
 class Program {
  public:
-  Program(const std::filesystem::path& folder, std::vector<std::string> arguments, const std::string& input = "")
+  /// `prepare` runs in the new process before the program does: limits, ignored signals, other standard streams.
+  Program(const std::filesystem::path& folder, std::vector<std::string> arguments, const std::string& input = "",
+          const std::function<void()>& prepare = {})
       : out_(folder / "stdout.txt"), error_(folder / "stderr.txt") {
     const std::filesystem::path in = folder / "stdin.txt";
     std::ofstream(in) << input;
@@ -48,6 +50,7 @@ class Program {
       redirect(in, O_RDONLY, STDIN_FILENO);
       redirect(out_, O_WRONLY | O_CREAT | O_TRUNC, STDOUT_FILENO);
       redirect(error_, O_WRONLY | O_CREAT | O_TRUNC, STDERR_FILENO);
+      if (prepare) prepare();
       ::execv(argv[0], argv.data());
       ::_exit(127);
     }
@@ -68,6 +71,19 @@ class Program {
       }
       std::this_thread::sleep_for(std::chrono::milliseconds(2));
     }
+  }
+
+  /// Has it come as far as to answer SIGTERM, which it then blocks in all threads but one? (Libraries that start threads block
+  /// all signals for a moment.)
+  bool answers_signals() const {
+    std::ifstream status("/proc/" + std::to_string(pid_) + "/status");
+    for (std::string name; status >> name;) {
+      unsigned long blocked = 0;
+      if (name != "SigBlk:" || !(status >> std::hex >> blocked)) continue;
+      const auto blocks = [blocked](int signal_number) { return (blocked >> (signal_number - 1) & 1) != 0; };
+      return blocks(SIGTERM) && !blocks(SIGHUP);
+    }
+    return false;
   }
 
   ProgramResult wait() {
