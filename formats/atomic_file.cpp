@@ -10,6 +10,7 @@
 #include <system_error>
 
 #include "formats/input_error.h"
+#include "formats/memory_need.h"
 
 namespace heddle {
 
@@ -117,11 +118,15 @@ std::vector<std::byte> read_whole_file(const fs::path& path) {
   struct stat status {};
   if (file.number() < 0 || ::fstat(file.number(), &status) != 0) fail(path, "cannot open", errno);
   if (S_ISDIR(status.st_mode)) fail(path, "cannot read", EISDIR);
+  require_memory(static_cast<std::uint64_t>(status.st_size), path.string());
   // One byte more than the size, so that the end of the file shows without growing.
   std::vector<std::byte> bytes(static_cast<std::size_t>(status.st_size) + 1);
   std::size_t size = 0;
   while (true) {
-    if (size == bytes.size()) bytes.resize(2 * size);
+    if (size == bytes.size()) {
+      require_memory(2 * size, path.string());
+      bytes.resize(2 * size);
+    }
     const ssize_t count = ::read(file.number(), bytes.data() + size, bytes.size() - size);
     if (count < 0 && errno == EINTR) continue;
     if (count < 0) fail(path, "cannot read", errno);

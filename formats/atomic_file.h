@@ -20,7 +20,7 @@ void write_file_atomically(const std::filesystem::path& path, std::string_view t
 void write_file_atomically(const std::filesystem::path& path,
                            const std::function<void(const std::filesystem::path& temporary)>& write);
 
-/// The whole file as bytes. Errors: FileError with the system's reason.
+/// The whole file as bytes. Errors: FileError with the system's reason; MemoryError where the machine has no room for it.
 std::vector<std::byte> read_whole_file(const std::filesystem::path& path);
 
 }  // namespace heddle
