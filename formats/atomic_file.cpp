@@ -22,6 +22,7 @@
 
 #include "formats/content_hash.h"
 #include "formats/input_error.h"
+#include "formats/memory_need.h"
 
 namespace heddle {
 
@@ -269,11 +270,15 @@ std::vector<std::byte> read_whole_file(const fs::path& path) {
   struct stat status {};
   if (file.number() < 0 || ::fstat(file.number(), &status) != 0) fail_at(path, "cannot open", errno);
   if (S_ISDIR(status.st_mode)) fail_at(path, "cannot read", EISDIR);
+  require_memory(static_cast<std::uint64_t>(status.st_size), path.string());
   // One byte more than the size, so that the end of the file shows without growing.
   std::vector<std::byte> bytes(static_cast<std::size_t>(status.st_size) + 1);
   std::size_t size = 0;
   while (true) {
-    if (size == bytes.size()) bytes.resize(2 * size);
+    if (size == bytes.size()) {
+      require_memory(2 * size, path.string());
+      bytes.resize(2 * size);
+    }
     const ssize_t count =
         uninterrupted([&] { return ::read(file.number(), bytes.data() + size, bytes.size() - size); });
     if (count < 0) fail_at(path, "cannot read", errno);

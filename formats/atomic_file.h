@@ -80,7 +80,7 @@ void write_file_atomically(const std::filesystem::path& path, std::string_view t
 /// Removes what lies under this process's temporary names: for a process that ends without running destructors.
 void remove_own_temporaries() noexcept;
 
-/// The whole file as bytes. Errors: FileError with the system's reason.
+/// The whole file as bytes. Errors: FileError with the system's reason; MemoryError where the machine has no room for it.
 std::vector<std::byte> read_whole_file(const std::filesystem::path& path);
 
 }  // namespace heddle
