@@ -62,18 +62,11 @@ def prepared_jobs(shop):
     return jobs, {name: value for job in jobs for name, value in job.after.items() if ".partial/" in name}
 
 
-def even_sample(count, most):
-    """Numbers from 1 to count, the first and the last among them."""
-    if count <= most:
-        return list(range(1, count + 1))
-    return sorted({1 + round(k * (count - 1) / (most - 1)) for k in range(most)})
-
-
 def faults_of(job):
     counts = collections.Counter(kind for kind, _, _ in job.calls)
     for kind, errors in FAULTS.items():
         for error, lasting in errors:
-            for number in even_sample(counts[kind], MOST_PER_GROUP):
+            for number in workshop.even_sample(counts[kind], MOST_PER_GROUP):
                 yield Fault(kind, number, error, lasting)
 
 
@@ -87,7 +80,7 @@ def check_fault(shop, job, fault, chunks):
     outcome = shop.run(job.arguments, case, fault)
 
     def what_is_there():
-        return {name: value for name, value in tree(case).items() if not may_stay(fault, name)}
+        return {name: value for name, value in tree(case).items() if name in job.after or not may_stay(fault, name)}
 
     found = what_is_there()
     problems = ended_by_signal(outcome) + old_or_new(found, job, chunks) + temporaries(found)

@@ -346,6 +346,13 @@ class States:
         return [stage for stage in self.stages if stage not in missing]
 
 
+def even_sample(count, most):
+    """Numbers from 1 to count, the first and the last among them."""
+    if count <= most:
+        return list(range(1, count + 1))
+    return sorted({1 + round(k * (count - 1) / (most - 1)) for k in range(most)})
+
+
 # ---- folders compared
 
 
