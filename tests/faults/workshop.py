@@ -207,7 +207,7 @@ class Workshop:
         return subprocess.Popen(line, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
                                 env=variables, cwd=case, text=True, errors="replace")
 
-    def run(self, arguments, case, fault=None, watch=False):
+    def run(self, arguments, case, fault=None, watch=False, timeout=60):
         """Runs in the case's folder, to the end. watch: notes the calls that count, too."""
         line = self.command(arguments)
         environment = {}
@@ -220,11 +220,11 @@ class Workshop:
         start = time.monotonic()
         process = self.start_program(line, case, environment)
         try:
-            out, error = process.communicate(timeout=60)
+            out, error = process.communicate(timeout=timeout)
         except subprocess.TimeoutExpired:
             process.kill()
             out, error = process.communicate()
-            error += "\nthe test killed it after 60 s\n"
+            error += f"\nthe test killed it after {timeout} s\n"
         calls, failed = read_calls(log, case) if environment else ([], [])
         return Outcome(line, fault, process.returncode, out, error, calls, failed, time.monotonic() - start)
 
