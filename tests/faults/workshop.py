@@ -207,14 +207,14 @@ class Workshop:
         return subprocess.Popen(line, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
                                 env=variables, cwd=case, text=True, errors="replace")
 
-    def run(self, arguments, case, fault=None, watch=False, timeout=60):
-        """Runs in the case's folder, to the end. watch: notes the calls that count, too."""
+    def run(self, arguments, case, fault=None, watch=False, timeout=60, below="."):
+        """Runs in the case's folder, to the end. watch: notes the calls that count, too. below: the folder on which they count."""
         line = self.command(arguments)
         environment = {}
         log = case.with_name(case.name + ".calls")
         if fault or watch:
             log.unlink(missing_ok=True)
-            environment = {"LD_PRELOAD": str(self.preload), "HEDDLE_FAULT_FOLDER": str(case), "HEDDLE_FAULT_LOG": str(log)}
+            environment = {"LD_PRELOAD": str(self.preload), "HEDDLE_FAULT_FOLDER": str(case / below), "HEDDLE_FAULT_LOG": str(log)}
             if fault:
                 environment.update(fault.environment())
         start = time.monotonic()
@@ -353,6 +353,33 @@ def even_sample(count, most):
     return sorted({1 + round(k * (count - 1) / (most - 1)) for k in range(most)})
 
 
+# ---- file systems of our own
+
+
+def may_mount():
+    """Starts the script again where it may mount without anyone else seeing it. False where the system does not permit that."""
+    if "HEDDLE_OWN_MOUNTS" in os.environ:
+        return True
+    for unshare in (["unshare", "--mount"], ["unshare", "--user", "--map-root-user", "--mount"]):
+        trial = 'mount -t tmpfs -o size=64k tmpfs "$0" && umount "$0"'
+        with tempfile.TemporaryDirectory() as folder:
+            if subprocess.run([*unshare, "sh", "-c", trial, folder], capture_output=True).returncode != 0:
+                continue
+        os.environ["HEDDLE_OWN_MOUNTS"] = "1"
+        sys.stdout.flush()
+        os.execvp("unshare", [*unshare, sys.executable, "-u", *sys.argv])
+    return False
+
+
+def mount(folder, options):
+    """An empty file system in memory at this folder, or other options for the one that is there."""
+    subprocess.run(["mount", "-t", "tmpfs", "-o", options, "tmpfs", str(folder)], check=True, capture_output=True)
+
+
+def unmount(folder):
+    subprocess.run(["umount", "--lazy", str(folder)], check=True, capture_output=True)
+
+
 # ---- folders compared
 
 
@@ -369,13 +396,19 @@ def without_timings(value):
     return [without_timings(entry) for entry in value] if isinstance(value, list) else value
 
 
+# What each page of a chart ends with; all of them show timings.
+CHART_PAGES = {"chart.csv": b"\n", "chart.json": b"}\n", "chart.svg": b"</svg>\n", "chart-local.svg": b"</svg>\n", "index.html": b"</html>\n"}
+
+
 def content(path):
-    """What is to be the same, undisturbed or not: bytes, but for the timings in JSON."""
+    """What is to be the same, undisturbed or not: bytes, but for the timings in JSON and in charts."""
     if path.is_symlink():
         return "link to " + os.readlink(path)
     if path.is_dir():
         return "folder"
     data = path.read_bytes()
+    if path.name in CHART_PAGES:
+        return "page" if data.endswith(CHART_PAGES[path.name]) else f"broken page of {len(data)} bytes"
     if path.suffix == ".json" and path.name != "manifest.json":
         try:
             return "json " + json.dumps(without_timings(json.loads(data)), sort_keys=True)
