@@ -6,7 +6,8 @@ them with that call failing. Laws, for every one:
   - each file under its final name, and each pack as a whole, is the old one or the new one;
   - no temporary file stays (but where removing was made to fail);
   - the same command once more succeeds and leaves the same bytes as an undisturbed run.
-A short write, and a folder that cannot be opened for flushing or flushed, are no failures at all.
+A short write, and a folder that cannot be opened for flushing or flushed, are no failures at all. An artifact of the cache that cannot
+be read is built again.
 """
 
 import collections
@@ -18,7 +19,7 @@ from workshop import (PACK, PICTURE, PICTURES, Fault, Job, States, differences, 
                       says_why, temporaries, tree)
 
 # Calls tried of one kind in one command; beyond that an even sample, the first and the last among them.
-MOST = 6
+MOST = 4
 MOST_OF_CHART = 2  # which is slow
 
 # What is done to calls of each kind: (error, lasting). A short write with all after it failing is a disk that is full.
@@ -92,6 +93,11 @@ def may_stay(fault, name):
     return fault.kind in ("unlink", "open-folder") and (is_temporary(name) or ".partial" in name)
 
 
+def cached(outcome):
+    """The files of the cache among those whose calls failed."""
+    return [path for _, _, path in outcome.failed if path.startswith("cache/")]
+
+
 def check_fault(shop, job, fault, chunks):
     case = shop.folder(copy_of=job.state)
     outcome = shop.run(job.arguments, case, fault)
@@ -105,6 +111,8 @@ def check_fault(shop, job, fault, chunks):
         problems += differences(found, job.after, "exit status 0, but", may_lack=is_cost)
     else:
         problems += says_why(outcome)
+        if fault.error == "EIO" and fault.kind in ("read", "open-read") and any(name in job.before for name in cached(outcome)):
+            problems.append("an artifact that cannot be read was not built again")
         if (fault.kind, fault.error, fault.lasting) in NO_FAILURES:
             problems.append("this is no failure")
     if outcome.status != 0 or problems:
