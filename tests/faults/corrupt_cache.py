@@ -11,7 +11,7 @@ import shutil
 import sys
 
 import workshop
-from workshop import PACK, PICTURES, States, content, differences, ended_by_signal, is_cost, temporaries, tree
+from workshop import PACK, PICTURES, States, content, differences, ended_by_signal, temporaries, tree
 
 FLIPS = 4  # of each file that a command reads
 INFO_FLIPS = 6  # of each kind of file that `info` is shown
@@ -93,8 +93,8 @@ class Broken:
     def group(self):
         """Stage and kind of file; keys are of no interest."""
         _, stage, *folders, file = self.name.split("/")
-        if stage == "pack" and folders:
-            return f"pack {file}"
+        if folders and not folders[0].endswith(".partial"):
+            return f"{stage} {file}"
         return f"{stage}{' chunk' if folders else ''} {file.split('.', 1)[1]}"
 
 
@@ -117,9 +117,9 @@ def check_broken(shop, broken, noticed):
         noticed["left as it was"] += 1
         expected = {**expected, broken.name: left}
         found.pop(broken.name + "/file", None)
-    elif broken.name in found and not is_cost(broken.name):
+    elif broken.name in found:
         problems.append("built again, but not named on standard error")
-    problems += differences(found, expected, "afterwards", may_lack=is_cost) + temporaries(found)
+    problems += differences(found, expected, "afterwards") + temporaries(found)
     shutil.rmtree(case)
     return problems and problems + outcome.text()
 
@@ -150,8 +150,8 @@ def first_of_each_kind(stage):
     kinds = {}
     for path in sorted(stage.rglob("*"), key=lambda path: (-path.stat().st_size, path)):
         if path.is_file():
-            in_pack = path.name if (path.parent / "manifest.json").is_file() else ""
-            kinds.setdefault((in_pack, "".join(path.suffixes), path.parent.suffix), path)
+            in_folder = path.name if path.parent != stage and path.parent.suffix != ".partial" else ""
+            kinds.setdefault((in_folder, "".join(path.suffixes), path.parent.suffix), path)
     return kinds.values()
 
 
@@ -163,8 +163,7 @@ def broken_artifacts(shop, states, chance):
         shutil.rmtree(case)
         for stage in stages:
             for path in first_of_each_kind(state / "cache" / stage):
-                # Notes of costs serve charts only, and tables of surfaces take a second to build.
-                slow = stage == "surface-weights" or path.name.endswith(".cost.json")
+                slow = stage == "surface-weights"  # a second to build
                 versions = list(broken_versions(path.read_bytes(), chance, 1 if slow else FLIPS))
                 for how, instead in versions[::3] if slow else versions:
                     yield Broken(arguments, state, expected, str(path.relative_to(state)), how, instead)
@@ -183,7 +182,7 @@ def info_of_broken_files(shop, states, chance):
     """`info` of one file of each kind; of a bare volume more often, as its library trusts what it reads."""
     kinds = {}
     for path in sorted((states.full / "cache").rglob("*")):
-        if path.is_file() and not path.name.endswith((".cost.json", ".png")) and "pack/" not in str(path):
+        if path.is_file() and not path.name.endswith((".record.json", ".png")) and "pack/" not in str(path):
             kinds.setdefault((path.parent.name, "".join(path.suffixes)), path)
     folder = shop.folder("info")
     for (stage, suffix), path in kinds.items():

@@ -12,7 +12,7 @@ import subprocess
 import sys
 
 import workshop
-from workshop import (PACK, PICTURE, PICTURES, Fault, Job, States, differences, ended_by_signal, is_cost, old_or_new, temporaries,
+from workshop import (PACK, PICTURE, PICTURES, Fault, Job, States, differences, ended_by_signal, old_or_new, temporaries,
                       tree)
 
 PAGE = 4096
@@ -44,7 +44,7 @@ def check_room(shop, job, pages):
     found = tree(case)
     problems = ended_by_signal(outcome) + old_or_new(found, job, {}) + temporaries(found)
     if outcome.status == 0:
-        problems += differences(found, job.after, "exit status 0, but", may_lack=is_cost)
+        problems += differences(found, job.after, "exit status 0, but")
     elif os.strerror(errno.ENOSPC) not in outcome.error:
         problems.append("the message lacks the reason: " + os.strerror(errno.ENOSPC))
     if outcome.status != 0 or problems:
@@ -53,7 +53,7 @@ def check_room(shop, job, pages):
         if again.status != 0:
             problems += ["with room again it fails:"] + again.text()
         left = tree(case)
-        problems += differences(left, job.after, "with room again", may_lack=is_cost) + temporaries(left)
+        problems += differences(left, job.after, "with room again") + temporaries(left)
     workshop.unmount(case)
     return f"full disk: {job.name}", f"room for {pages} pages", problems and problems + outcome.text()
 
@@ -67,7 +67,7 @@ def folders_not_flushed(shop, jobs):
         folder = shop.folder(copy_of=job.state)
         outcome = shop.run(job.arguments, folder, Fault("flush-folder", 1, error, lasting=True))
         problems = [] if outcome.status == 0 else ["it fails"]
-        problems += differences(tree(folder), job.after, "afterwards", may_lack=is_cost)
+        problems += differences(tree(folder), job.after, "afterwards")
         shutil.rmtree(folder)
         return "folders that cannot be flushed", f"{job.name}: {error}", problems and problems + outcome.text()
 

@@ -15,7 +15,7 @@ import shutil
 import sys
 
 import workshop
-from workshop import (PACK, PICTURE, PICTURES, Fault, Job, States, differences, ended_by_signal, is_cost, is_temporary, old_or_new,
+from workshop import (PACK, PICTURE, PICTURES, Fault, Job, States, differences, ended_by_signal, is_temporary, old_or_new,
                       says_why, temporaries, tree)
 
 # Calls tried of one kind in one command; beyond that an even sample, the first and the last among them.
@@ -108,7 +108,7 @@ def check_fault(shop, job, fault, chunks):
     found = what_is_there()
     problems = ended_by_signal(outcome) + old_or_new(found, job, chunks) + temporaries(found)
     if outcome.status == 0:
-        problems += differences(found, job.after, "exit status 0, but", may_lack=is_cost)
+        problems += differences(found, job.after, "exit status 0, but")
     else:
         problems += says_why(outcome)
         if fault.error == "EIO" and fault.kind in ("read", "open-read") and any(name in job.before for name in cached(outcome)):
@@ -120,7 +120,7 @@ def check_fault(shop, job, fault, chunks):
         if again.status != 0:
             problems += ["the same command once more fails:"] + again.text()
         left = what_is_there()
-        problems += differences(left, job.after, "once more", may_lack=is_cost) + temporaries(left)
+        problems += differences(left, job.after, "once more") + temporaries(left)
     shutil.rmtree(case)
     return problems and problems + outcome.text()
 

@@ -12,7 +12,7 @@ import sys
 import time
 
 import workshop
-from workshop import PACK, PICTURE, PICTURES, Fault, Job, States, differences, is_cost, old_or_new, temporaries, tree
+from workshop import PACK, PICTURE, PICTURES, Fault, Job, States, differences, old_or_new, temporaries, tree
 
 KILLS = 100  # at random moments
 BEFORE_CALLS = 6  # of each kind of call of each job
@@ -50,7 +50,7 @@ def after_a_kill(shop, job, case, chunks):
     if again.status != 0:
         problems += ["the same command once more fails:"] + again.text()
     left = tree(case)
-    problems += differences(left, job.after, "once more", may_lack=is_cost) + temporaries(left)
+    problems += differences(left, job.after, "once more") + temporaries(left)
     return problems and problems + again.text()
 
 

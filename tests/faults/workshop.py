@@ -389,10 +389,10 @@ def is_temporary(name):
 
 
 def without_timings(value):
-    """A JSON value without what differs from run to run."""
+    """A JSON value without what differs from run to run: times, and the checksums of files that hold some."""
     if isinstance(value, dict):
         return {key: without_timings(entry) for key, entry in value.items()
-                if "seconds" not in key and key not in ("costs", "threads")}
+                if "seconds" not in key and key not in ("costs", "threads", "seal", "picture.json")}
     return [without_timings(entry) for entry in value] if isinstance(value, list) else value
 
 
@@ -432,12 +432,10 @@ def below(files, folder):
     return {name: value for name, value in files.items() if name.startswith(folder + "/")}
 
 
-def differences(found, expected, what, may_lack=lambda name: False):
+def differences(found, expected, what):
     """Lines that say where two trees differ."""
     lines = []
     for name in sorted(found.keys() | expected.keys()):
-        if name not in found and may_lack(name):
-            continue
         left, right = found.get(name, "not there"), expected.get(name, "not there")
         if left != right:
             lines.append(f"{what}: {name}: {left[:100]}; expected: {right[:100]}")
@@ -451,9 +449,10 @@ def temporaries(found):
 # ---- laws of single runs
 
 
-def packs_of(*trees):
-    """Folders that are packs in any of the trees."""
-    return {name.removesuffix("/manifest.json") for files in trees for name in files if name.endswith("/manifest.json")}
+def whole_folders(*trees):
+    """Packs and cached pictures in any of the trees."""
+    return {name.rpartition("/")[0] for files in trees for name in files if name.endswith(("/manifest.json", "/picture.json"))
+            if name.startswith("cache/") or name.endswith("/manifest.json")}
 
 
 def old_or_new(found, job, chunks):
@@ -463,15 +462,10 @@ def old_or_new(found, job, chunks):
         known = (job.before.get(name), job.after.get(name), chunks.get(name))
         if not is_temporary(name) and value != "folder" and value not in known:
             problems.append(f"neither old nor new: {name}: {value[:100]}")
-    for pack in packs_of(job.before, job.after, found):
-        if below(found, pack) not in (below(job.before, pack), below(job.after, pack)):
-            problems.append(f"the pack is neither the old one nor the new one: {pack}")
+    for folder in whole_folders(job.before, job.after, found):
+        if below(found, folder) not in (below(job.before, folder), below(job.after, folder)):
+            problems.append(f"as a whole neither the old one nor the new one: {folder}")
     return problems
-
-
-def is_cost(name):
-    """A note of what an artifact took: nice to have."""
-    return name.endswith(".cost.json")
 
 
 def ended_by_signal(outcome):
