@@ -93,9 +93,18 @@ def may_stay(fault, name):
     return fault.kind in ("unlink", "open-folder") and (is_temporary(name) or ".partial" in name)
 
 
-def cached(outcome):
-    """The files of the cache among those whose calls failed."""
-    return [path for _, _, path in outcome.failed if path.startswith("cache/")]
+def unreadable(outcome, job):
+    """Whether the first try to read a file of the cache failed."""
+    if not outcome.failed:
+        return False
+    kind, number, path = outcome.failed[0]
+    return kind in ("read", "open-read") and path.startswith("cache/") and path in job.before and not any(
+        call[2] == path and call[0] == kind and call[1] < number for call in outcome.calls)
+
+
+def hides_what_is_replaced(outcome, job):
+    """Whether it kept the program from seeing what lies where an output goes."""
+    return any(kind == "open-folder" and path + "/manifest.json" in job.before for kind, _, path in outcome.failed)
 
 
 def check_fault(shop, job, fault, chunks):
@@ -111,9 +120,9 @@ def check_fault(shop, job, fault, chunks):
         problems += differences(found, job.after, "exit status 0, but")
     else:
         problems += says_why(outcome)
-        if fault.error == "EIO" and fault.kind in ("read", "open-read") and any(name in job.before for name in cached(outcome)):
+        if fault.error == "EIO" and unreadable(outcome, job):
             problems.append("an artifact that cannot be read was not built again")
-        if (fault.kind, fault.error, fault.lasting) in NO_FAILURES:
+        if (fault.kind, fault.error, fault.lasting) in NO_FAILURES and not hides_what_is_replaced(outcome, job):
             problems.append("this is no failure")
     if outcome.status != 0 or problems:
         again = shop.run(job.arguments, case)

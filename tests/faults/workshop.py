@@ -451,8 +451,8 @@ def temporaries(found):
 
 def whole_folders(*trees):
     """Packs and cached pictures in any of the trees."""
-    return {name.rpartition("/")[0] for files in trees for name in files if name.endswith(("/manifest.json", "/picture.json"))
-            if name.startswith("cache/") or name.endswith("/manifest.json")}
+    return {name.rpartition("/")[0] for files in trees for name in files if not is_temporary(name)
+            if name.endswith("/manifest.json") or name.startswith("cache/picture/") and name.endswith("/picture.json")}
 
 
 def old_or_new(found, job, chunks):
