@@ -22,6 +22,7 @@
 
 #include "formats/content_hash.h"
 #include "formats/input_error.h"
+#include "formats/memory_need.h"
 
 namespace heddle {
 
@@ -199,18 +200,26 @@ void AtomicFile::check() const {
 }
 
 void AtomicFile::write(std::span<const std::byte> bytes) {
-  buffer_.insert(buffer_.end(), bytes.begin(), bytes.end());
-  if (buffer_.size() >= kBufferBytes) write_buffer();
+  if (buffer_.size() + bytes.size() > kBufferBytes) write_buffer();
+  if (bytes.size() > kBufferBytes) {
+    write_now(bytes);
+  } else {
+    buffer_.insert(buffer_.end(), bytes.begin(), bytes.end());
+  }
 }
 
-void AtomicFile::write_buffer() {
-  for (std::span<const std::byte> rest = buffer_; !rest.empty();) {
+void AtomicFile::write_now(std::span<const std::byte> bytes) {
+  for (std::span<const std::byte> rest = bytes; !rest.empty();) {
     const ssize_t count = uninterrupted([&] { return ::write(descriptor_, rest.data(), rest.size()); });
     if (count <= 0) fail(count < 0 ? errno : ENOSPC);
     rest = rest.subspan(static_cast<std::size_t>(count));
     position_ += static_cast<std::uint64_t>(count);
   }
   size_ = std::max(size_, position_);
+}
+
+void AtomicFile::write_buffer() {
+  write_now(buffer_);
   buffer_.clear();
 }
 
@@ -235,6 +244,11 @@ void AtomicFile::commit() {
   temporary_.commit();
 }
 
+void require_writable(const fs::path& target) {
+  if (fs::is_directory(target)) fail_at(target, "cannot write", EISDIR);
+  const AtomicFile removed_at_once(target);
+}
+
 void write_file_atomically(const fs::path& path, std::span<const std::byte> bytes) {
   AtomicFile file(path);
   file.write(bytes);
@@ -256,11 +270,15 @@ std::vector<std::byte> read_whole_file(const fs::path& path) {
   struct stat status {};
   if (file.number() < 0 || ::fstat(file.number(), &status) != 0) fail_at(path, "cannot open", errno);
   if (S_ISDIR(status.st_mode)) fail_at(path, "cannot read", EISDIR);
+  require_memory(static_cast<std::uint64_t>(status.st_size), path.string());
   // One byte more than the size, so that the end of the file shows without growing.
   std::vector<std::byte> bytes(static_cast<std::size_t>(status.st_size) + 1);
   std::size_t size = 0;
   while (true) {
-    if (size == bytes.size()) bytes.resize(2 * size);
+    if (size == bytes.size()) {
+      require_memory(2 * size, path.string());
+      bytes.resize(2 * size);
+    }
     const ssize_t count =
         uninterrupted([&] { return ::read(file.number(), bytes.data() + size, bytes.size() - size); });
     if (count < 0) fail_at(path, "cannot read", errno);

@@ -60,6 +60,7 @@ class AtomicFile {
 
  private:
   void fail(int reason);
+  void write_now(std::span<const std::byte> bytes);
   void write_buffer();
 
   TemporaryPath temporary_;
@@ -70,13 +71,16 @@ class AtomicFile {
   int failure_ = 0;  // the system's reason
 };
 
+/// FileError where a file could not be put there now: for commands that work long before they write.
+void require_writable(const std::filesystem::path& target);
+
 void write_file_atomically(const std::filesystem::path& path, std::span<const std::byte> bytes);
 void write_file_atomically(const std::filesystem::path& path, std::string_view text);
 
 /// Removes what lies under this process's temporary names: for a process that ends without running destructors.
 void remove_own_temporaries() noexcept;
 
-/// The whole file as bytes. Errors: FileError with the system's reason.
+/// The whole file as bytes. Errors: FileError with the system's reason; MemoryError where the machine has no room for it.
 std::vector<std::byte> read_whole_file(const std::filesystem::path& path);
 
 }  // namespace heddle

@@ -7,12 +7,14 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "formats/atomic_file.h"
 #include "formats/input_error.h"
+#include "formats/memory_need.h"
 
 namespace heddle {
 namespace {
@@ -35,6 +37,7 @@ class Reader {
     const auto pixels = static_cast<std::uint64_t>(image.width) * static_cast<std::uint64_t>(image.height);
     if (3 * pixels > kMaxValues) fail(fmt::format("{} values (at most {})", 3 * pixels, kMaxValues));
     if (pixels / kMaxPixelsPerByte > bytes_.size()) fail("too short for its size in pixels");
+    require_memory(3 * sizeof(float) * pixels, fmt::format("{} x {} pixels", image.width, image.height));
     std::array<std::vector<float>*, 3> channels;
     const char* names[] = {"R", "G", "B"};
     for (std::size_t c = 0; c < 3; ++c) {
@@ -190,7 +193,7 @@ Image read_hdr(const std::filesystem::path& path) {
   const std::vector<std::byte> bytes = read_whole_file(path);
   try {
     return Reader({reinterpret_cast<const char*>(bytes.data()), bytes.size()}).read();
-  } catch (const FileError& error) {
+  } catch (const std::runtime_error& error) {
     throw FileError(fmt::format("{}: cannot read as a Radiance picture: {}", path.string(), error.what()));
   }
 }

@@ -22,7 +22,7 @@ namespace {
 constexpr int kMaxExtent = 4096;
 constexpr std::uint64_t kMaxVoxels = std::uint64_t{1} << 31;
 constexpr std::int32_t kEmpty = -1;
-constexpr std::int32_t kMaxId = std::numeric_limits<std::int32_t>::max() - 1;  // OpenVDB takes id - kEmpty
+[[maybe_unused]] constexpr std::int32_t kMaxId = std::numeric_limits<std::int32_t>::max() - 1;  // OpenVDB takes id - kEmpty
 
 constexpr const char* kGridName = "segment_id";
 constexpr const char* kSizeKey = "size";

@@ -9,18 +9,24 @@
 #include <ImfInputFile.h>
 #include <ImfOutputFile.h>
 #include <ImfStandardAttributes.h>
+#include <ImfStdIO.h>
 #include <ImfStringAttribute.h>
 #include <ImfTestFile.h>
+#include <ImfTileDescription.h>
+#include <ImfXdr.h>
 #include <fmt/format.h>
 #include <half.h>
 #include <png.h>
 
 #include <algorithm>
 #include <cassert>
+#include <fstream>
 #include <span>
+#include <utility>
 
 #include "formats/atomic_file.h"
 #include "formats/input_error.h"
+#include "formats/memory_need.h"
 
 namespace heddle {
 
@@ -29,7 +35,7 @@ namespace {
 constexpr int kMaxExtent = 16384;
 constexpr std::size_t kMaxChannels = 1024;
 constexpr std::uint64_t kMaxSamples = std::uint64_t{1} << 30;  // over all channels: 4 GiB of memory
-constexpr std::uint64_t kMaxDeflateRatio = 1400;               // 1032 : 1, times 4/3 where PXR24 drops a byte
+constexpr int kRowsAtOnce = 64;                                // rows that are decoded before memory for more is used
 
 Imf::PixelType pixel_type(ChannelType type) {
   switch (type) {
@@ -42,11 +48,37 @@ Imf::PixelType pixel_type(ChannelType type) {
   }
 }
 
-/// Methods whose output is at most kMaxDeflateRatio times as long as their input.
-bool is_deflate_like(Imf::Compression compression) {
-  return compression == Imf::NO_COMPRESSION || compression == Imf::RLE_COMPRESSION ||
-         compression == Imf::ZIPS_COMPRESSION || compression == Imf::ZIP_COMPRESSION ||
-         compression == Imf::PXR24_COMPRESSION;
+struct CompressionBound {
+  int rows;             // of a chunk of scan lines
+  std::uint64_t ratio;  // bytes of pixels that one byte of a chunk can stand for, at most
+};
+
+/// Ratios follow from each method's coding; black images reach them (formats/README.md).
+CompressionBound bound_of(Imf::Compression compression) {
+  constexpr std::uint64_t kDeflate = 1032;
+  switch (compression) {
+    case Imf::NO_COMPRESSION:
+      return {1, 1};
+    case Imf::RLE_COMPRESSION:
+      return {1, 64};  // runs of 128 bytes in 2
+    case Imf::ZIPS_COMPRESSION:
+      return {1, kDeflate};
+    case Imf::ZIP_COMPRESSION:
+      return {16, kDeflate};
+    case Imf::PXR24_COMPRESSION:
+      return {16, kDeflate * 4 / 3};  // leaves one byte of four out
+    case Imf::PIZ_COMPRESSION:
+      return {32, 410};  // Huffman codes of 10 bits for 256 values of 2 bytes
+    case Imf::B44_COMPRESSION:
+    case Imf::B44A_COMPRESSION:
+      return {32, 11};  // 4 x 4 values of 2 bytes in 3
+    case Imf::DWAA_COMPRESSION:
+      return {32, 64 * kDeflate};  // 8 x 8 values of 4 bytes are 4 bytes before deflation; runs as in RLE
+    case Imf::DWAB_COMPRESSION:
+      return {256, 64 * kDeflate};
+    default:
+      throw FileError("an unknown compression");
+  }
 }
 
 template <class T>
@@ -97,64 +129,183 @@ void write_exr_to(Imf::OStream& stream, const Image& image) {
   file.writePixels(image.height);
 }
 
-Image read_exr_from(const std::filesystem::path& path) {
-  const auto fail = [](const std::string& reason) { throw FileError(reason); };
-  bool tiled = false;
-  bool deep = false;
-  bool multi_part = false;
-  if (!Imf::isOpenExrFile(path.c_str(), tiled, deep, multi_part)) fail("no OpenEXR file");
-  if (deep || multi_part) fail("deep and multi-part files are not supported");
-  Imf::Header::setMaxImageSize(kMaxExtent,
-                               kMaxExtent);  // checked before the library allocates its line table
-  Imf::Header::setMaxTileSize(kMaxExtent, kMaxExtent);
-
-  Imf::InputFile file(path.c_str());
-  const Imf::Header& header = file.header();
-  const Imath::Box2i window = header.dataWindow();
-  const std::int64_t width = std::int64_t{window.max.x} - window.min.x + 1;
-  const std::int64_t height = std::int64_t{window.max.y} - window.min.y + 1;
-  if (width < 1 || height < 1 || width > kMaxExtent || height > kMaxExtent) {
-    fail(fmt::format("{} x {} pixels (at most {} x {})", width, height, kMaxExtent, kMaxExtent));
+/// The header, with every size checked before the library takes memory for it.
+class ExrHeader {
+ public:
+  explicit ExrHeader(const std::filesystem::path& path) : file_bytes_(std::filesystem::file_size(path)) {
+    bool deep = false;
+    bool multi_part = false;
+    if (!Imf::isOpenExrFile(path.c_str(), is_tiled_, deep, multi_part)) throw FileError("no OpenEXR file");
+    if (deep || multi_part) throw FileError("deep and multi-part files are not supported");
+    check_attributes(path);
+    Imf::StdIFStream stream(path.c_str());
+    char magic[4];
+    stream.read(magic, sizeof(magic));
+    int version = 0;
+    Imf::Xdr::read<Imf::StreamIO>(stream, version);
+    header_.readFrom(stream, version);
+    Imf::Header::setMaxImageSize(kMaxExtent, kMaxExtent);
+    Imf::Header::setMaxTileSize(kMaxExtent, kMaxExtent);
+    check_extents();
+    header_.sanityCheck(is_tiled_);
+    check_chunks(stream.tellg());
   }
-  std::uint64_t channels = 0;
-  std::uint64_t bytes_per_pixel = 0;
-  for (auto it = header.channels().begin(); it != header.channels().end(); ++it) {
-    if (it.channel().xSampling != 1 || it.channel().ySampling != 1) {
-      fail(fmt::format("channel {} is subsampled", it.name()));
+
+  const Imf::Header& header() const { return header_; }
+  int width() const { return width_; }
+  int height() const { return height_; }
+  /// Rows to ask for at once: whole chunks, so that none is decoded twice (a file of tiles keeps a row of them).
+  int rows_at_once() const { return std::min(height_, std::max(kRowsAtOnce, bound_of(header_.compression()).rows)); }
+
+  /// Bytes to read the picture: its values, a few rows of them, and what the library holds of chunks or tiles.
+  std::uint64_t memory() const {
+    constexpr std::uint64_t kCopies = 6;  // of a chunk, in the library's decoders
+    const auto width = static_cast<std::uint64_t>(width_);
+    std::uint64_t library = kCopies * width * static_cast<std::uint64_t>(bound_of(header_.compression()).rows);
+    if (is_tiled_) {
+      const Imf::TileDescription& tile = header_.tileDescription();
+      library = std::uint64_t{tile.ySize} * (width + kCopies * tile.xSize);
     }
-    ++channels;
-    bytes_per_pixel += it.channel().type == Imf::HALF ? 2 : 4;
+    return sizeof(float) * channels_ * width * static_cast<std::uint64_t>(height_ + rows_at_once()) +
+           bytes_per_pixel_ * library;
   }
-  const std::uint64_t pixels = static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height);
-  if (channels == 0 || channels > kMaxChannels)
-    fail(fmt::format("{} channels (1 to {})", channels, kMaxChannels));
-  if (pixels * channels > kMaxSamples)
-    fail(fmt::format("{} values (at most {})", pixels * channels, kMaxSamples));
-  if (is_deflate_like(header.compression()) &&
-      pixels * bytes_per_pixel / kMaxDeflateRatio > std::filesystem::file_size(path)) {
-    fail("too short for its size in pixels");
-  }
-  if (!file.isComplete()) fail("incomplete");
 
-  Image image;
-  image.width = static_cast<int>(width);
-  image.height = static_cast<int>(height);
-  Imf::FrameBuffer buffer;
-  for (auto it = header.channels().begin(); it != header.channels().end(); ++it) {
+  std::string text() const { return fmt::format("{} x {} pixels, {} channels", width_, height_, channels_); }
+
+ private:
+  /// Attributes are name, type, size and value; the library takes memory for any size that it reads.
+  void check_attributes(const std::filesystem::path& path) const {
+    std::ifstream file(path, std::ios::binary);
+    file.seekg(8);  // magic number and version
+    const auto skip_text = [&file] {
+      std::string text;
+      std::getline(file, text, '\0');
+      return !text.empty();
+    };
+    while (skip_text() && skip_text()) {
+      std::int32_t size = 0;
+      file.read(reinterpret_cast<char*>(&size), sizeof(size));  // little-endian, as this machine
+      const auto at = static_cast<std::uint64_t>(file.tellg());
+      if (!file || size < 0 || static_cast<std::uint64_t>(size) > file_bytes_ - at) {
+        throw FileError("an attribute passes the end of the file");
+      }
+      file.seekg(size, std::ios::cur);
+    }
+  }
+
+  void check_extents() {
+    const Imath::Box2i window = header_.dataWindow();
+    const std::int64_t width = std::int64_t{window.max.x} - window.min.x + 1;
+    const std::int64_t height = std::int64_t{window.max.y} - window.min.y + 1;
+    if (width < 1 || height < 1 || width > kMaxExtent || height > kMaxExtent) {
+      throw FileError(fmt::format("{} x {} pixels (at most {} x {})", width, height, kMaxExtent, kMaxExtent));
+    }
+    width_ = static_cast<int>(width);
+    height_ = static_cast<int>(height);
+    for (auto it = header_.channels().begin(); it != header_.channels().end(); ++it) {
+      if (it.channel().xSampling != 1 || it.channel().ySampling != 1) {
+        throw FileError(fmt::format("channel {} is subsampled", it.name()));
+      }
+      ++channels_;
+      bytes_per_pixel_ += it.channel().type == Imf::HALF ? 2 : 4;
+    }
+    if (channels_ == 0 || channels_ > kMaxChannels) {
+      throw FileError(fmt::format("{} channels (1 to {})", channels_, kMaxChannels));
+    }
+    if (pixels() * channels_ > kMaxSamples) {
+      throw FileError(fmt::format("{} values (at most {})", pixels() * channels_, kMaxSamples));
+    }
+  }
+
+  /// Behind the header: a table of 8 bytes per chunk, then the chunks.
+  void check_chunks(std::uint64_t table_begin) const {
+    const CompressionBound bound = bound_of(header_.compression());
+    const auto parts = [](int extent, std::uint64_t part) { return (static_cast<std::uint64_t>(extent) + part - 1) / part; };
+    std::uint64_t chunks = parts(height_, static_cast<std::uint64_t>(bound.rows));
+    if (is_tiled_) {
+      const Imf::TileDescription& tile = header_.tileDescription();
+      chunks = parts(width_, tile.xSize) * parts(height_, tile.ySize);
+    }
+    const std::uint64_t least = table_begin + 8 * chunks + pixels() * bytes_per_pixel_ / bound.ratio;
+    if (least > file_bytes_) throw FileError("too short for its size in pixels");
+  }
+
+  std::uint64_t pixels() const { return static_cast<std::uint64_t>(width_) * static_cast<std::uint64_t>(height_); }
+
+  std::uint64_t file_bytes_;
+  Imf::Header header_;
+  bool is_tiled_ = false;
+  int width_ = 0;
+  int height_ = 0;
+  std::uint64_t channels_ = 0;
+  std::uint64_t bytes_per_pixel_ = 0;
+};
+
+/// One channel being read: rows are decoded into `rows`, then appended. Memory so grows as the file proves to hold data.
+struct ChannelReader {
+  std::string name;
+  ImageChannel* channel;
+  std::vector<float> rows;  // [rows at once][width]
+  std::vector<std::uint32_t> id_rows;
+
+  void append(std::size_t count) {
+    const auto add = [count](auto& to, const auto& from) {
+      if (!from.empty()) to.insert(to.end(), from.begin(), from.begin() + static_cast<std::ptrdiff_t>(count));
+    };
+    add(channel->values, rows);
+    add(channel->ids, id_rows);
+  }
+};
+
+std::vector<ChannelReader> channel_readers(const ExrHeader& checked, Image& image) {
+  const auto pixels = static_cast<std::size_t>(checked.width()) * static_cast<std::size_t>(checked.height());
+  const auto rows = static_cast<std::size_t>(checked.width()) * static_cast<std::size_t>(checked.rows_at_once());
+  std::vector<ChannelReader> readers;
+  const Imf::ChannelList& channels = checked.header().channels();
+  for (auto it = channels.begin(); it != channels.end(); ++it) {
     ImageChannel& channel = image.channels[it.name()];
+    ChannelReader reader{it.name(), &channel, {}, {}};
     if (it.channel().type == Imf::UINT) {
       channel.type = ChannelType::kUint;
-      channel.ids.resize(pixels);
-      buffer.insert(it.name(), slice_of(Imf::UINT, channel.ids.data(), window, image.width));
+      channel.ids.reserve(pixels);
+      reader.id_rows.resize(rows);
     } else {
       channel.type = it.channel().type == Imf::HALF ? ChannelType::kHalf : ChannelType::kFloat;
-      channel.values.resize(pixels);
-      buffer.insert(it.name(), slice_of(Imf::FLOAT, channel.values.data(), window, image.width));
+      channel.values.reserve(pixels);
+      reader.rows.resize(rows);
+    }
+    readers.push_back(std::move(reader));
+  }
+  return readers;
+}
+
+Image read_exr_from(const std::filesystem::path& path) {
+  const ExrHeader checked(path);
+  require_memory(checked.memory(), checked.text());
+  Imf::InputFile file(path.c_str());
+  if (!file.isComplete()) throw FileError("incomplete");
+
+  Image image;
+  image.width = checked.width();
+  image.height = checked.height();
+  std::vector<ChannelReader> readers = channel_readers(checked, image);
+  const Imath::Box2i window = checked.header().dataWindow();
+  for (int row = 0; row < image.height; row += checked.rows_at_once()) {
+    const int last = std::min(row + checked.rows_at_once(), image.height) - 1;
+    const Imath::Box2i part({window.min.x, window.min.y + row}, {window.max.x, window.min.y + last});
+    Imf::FrameBuffer buffer;
+    for (const ChannelReader& reader : readers) {
+      const bool is_id = reader.channel->type == ChannelType::kUint;
+      buffer.insert(reader.name, is_id ? slice_of(Imf::UINT, reader.id_rows.data(), part, image.width)
+                                       : slice_of(Imf::FLOAT, reader.rows.data(), part, image.width));
+    }
+    file.setFrameBuffer(buffer);
+    file.readPixels(part.min.y, part.max.y);
+    for (ChannelReader& filled : readers) {
+      filled.append(static_cast<std::size_t>(last - row + 1) * static_cast<std::size_t>(image.width));
     }
   }
-  file.setFrameBuffer(buffer);
-  file.readPixels(window.min.y, window.max.y);
-  for (auto it = header.begin(); it != header.end(); ++it) {
+  for (auto it = checked.header().begin(); it != checked.header().end(); ++it) {
     if (const auto* text = dynamic_cast<const Imf::StringAttribute*>(&it.attribute())) {
       image.metadata[it.name()] = text->value();
     }

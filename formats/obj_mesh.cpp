@@ -27,7 +27,7 @@ struct Corner {
 
 class Parser {
  public:
-  explicit Parser(const std::filesystem::path& path) : path_(path) {}
+  Parser(const std::filesystem::path& path, const ObjUnits& units) : path_(path), units_(units) {}
 
   ObjMesh parse(std::string_view text) {
     while (!text.empty()) {
@@ -60,8 +60,10 @@ class Parser {
     const std::string_view keyword = next_word(rest);
     if (keyword == "v") {
       positions_.push_back(numbers<3>(rest, "vertex"));
+      check_place("vertex", positions_, units_.mm_per_unit);
     } else if (keyword == "vt") {
       uvs_.push_back(numbers<2>(rest, "texture coordinate"));
+      check_place("texture coordinate", uvs_, units_.mm_per_uv);
     } else if (keyword == "vn") {
       normals_.push_back(unit_vector(numbers<3>(rest, "normal")));
     } else if (keyword == "f") {
@@ -87,6 +89,17 @@ class Parser {
       value = static_cast<float>(number);
     }
     return result;
+  }
+
+  /// The last of the places read so far.
+  template <std::size_t N>
+  void check_place(const char* what, const std::vector<std::array<float, N>>& places, double mm_per_unit) const {
+    for (const float coordinate : places.back()) {
+      const double mm = coordinate * mm_per_unit;
+      if (std::abs(mm) <= kMaxCoordinateMm) continue;
+      fail(fmt::format("{} {}: a coordinate of {:g} mm; at most {:g} mm (1 km) either way", what, places.size(), mm,
+                       kMaxCoordinateMm));
+    }
   }
 
   std::array<float, 3> unit_vector(const std::array<float, 3>& v) const {
@@ -172,6 +185,7 @@ class Parser {
   }
 
   std::filesystem::path path_;
+  ObjUnits units_;
   std::size_t line_ = 0;
   std::size_t faces_ = 0;
   bool has_uvs_ = false;
@@ -185,9 +199,9 @@ class Parser {
 
 }  // namespace
 
-ObjMesh read_obj(const std::filesystem::path& path) {
+ObjMesh read_obj(const std::filesystem::path& path, const ObjUnits& units) {
   const std::vector<std::byte> bytes = read_whole_file(path);
-  return Parser(path).parse({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  return Parser(path, units).parse({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
 }
 
 }  // namespace heddle

@@ -22,9 +22,11 @@ static_assert(std::endian::native == std::endian::little, "tensors are stored as
 
 namespace {
 
-using Json = nlohmann::ordered_json;
+using OrderedJson = nlohmann::ordered_json;  // for writing: finds a key by looking at all
+using Json = nlohmann::json;
 
 constexpr std::uint64_t kMaxHeaderBytes = 100'000'000;
+constexpr std::size_t kMaxNames = 10'000;  // tensors, or entries of metadata; our own files hold fewer than ten
 constexpr std::string_view kMetadataKey = "__metadata__";
 
 struct TypeInfo {
@@ -56,7 +58,7 @@ std::optional<std::uint64_t> byte_count(TensorType type, const std::vector<std::
   return bytes;
 }
 
-/// Refuses what a tree of values would hide or could choke on: repeated keys, deep nesting.
+/// Refuses what a tree of values would hide or could choke on: repeated keys, deep nesting, too many names.
 class HeaderCheck : public nlohmann::json_sax<Json> {
  public:
   const std::string& problem() const { return problem_; }
@@ -73,6 +75,10 @@ class HeaderCheck : public nlohmann::json_sax<Json> {
   bool start_array(std::size_t) override { return open(); }
   bool end_array() override { return close(); }
   bool key(string_t& name) override {
+    if (keys_.back().size() == kMaxNames) {
+      problem_ = fmt::format("more than {} names in one object", kMaxNames);
+      return false;
+    }
     if (keys_.back().insert(name).second) return true;
     problem_ = fmt::format("the key \"{}\" occurs twice", name);
     return false;
@@ -183,12 +189,12 @@ void TensorFileWriter::write(const std::filesystem::path& path) const {
     return info_of(a->second.type).bytes > info_of(b->second.type).bytes;
   });
 
-  Json header = Json::object();
+  OrderedJson header = OrderedJson::object();
   if (!metadata_.empty()) header[kMetadataKey] = metadata_;
   std::uint64_t offset = 0;
   for (const auto* item : order) {
     const Tensor& tensor = item->second;
-    Json entry;
+    OrderedJson entry;
     entry["dtype"] = info_of(tensor.type).name;
     entry["shape"] = tensor.shape;
     entry["data_offsets"] = {offset, offset + tensor.bytes.size()};

@@ -8,7 +8,9 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <optional>
 #include <tuple>
+#include <utility>
 
 #include "formats/atomic_file.h"
 #include "formats/input_error.h"
@@ -17,7 +19,10 @@ namespace heddle {
 
 namespace {
 
-constexpr std::size_t kMaxDocumentBytes = std::size_t{16} << 20;
+// Hand-written configs take a few kilobytes. A document takes up to 140 times its size in memory.
+constexpr std::size_t kMaxDocumentBytes = std::size_t{1} << 20;
+// Tables and arrays within each other. Ours need fewer than ten; toml++ and this file walk them by recursion.
+constexpr std::size_t kMaxDepth = 64;
 
 struct Unit {
   std::string_view suffix;
@@ -107,13 +112,144 @@ std::string printable(std::string_view text) {
   return result;
 }
 
+bool continues_code_point(char c) {
+  return (static_cast<unsigned char>(c) & 0xC0) == 0x80;
+}
+
 std::string shortened(std::string_view text) {
   constexpr std::size_t kLength = 40;
   if (text.size() <= kLength) return std::string(text);
   std::size_t end = kLength;
-  while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0) == 0x80) --end;
+  while (end > 0 && continues_code_point(text[end])) --end;
   return std::string(text.substr(0, end)) + "...";
 }
+
+/// The source line (in part, where it is long) and a caret under the column, which counts code points from 1.
+std::string excerpt(std::string_view line, std::size_t column) {
+  constexpr std::size_t kWidth = 120;
+  constexpr std::size_t kBefore = 60;  // of these to the left of the caret, where the beginning is left out
+  const std::size_t first = column > kWidth ? column - 1 - kBefore : 0;
+  std::string source = first > 0 ? "..." : "";
+  std::string caret(source.size(), ' ');
+  std::size_t code_point = 0;  // of the next character
+  for (const char c : line) {
+    if (!continues_code_point(c) && ++code_point > first + kWidth) {
+      source += "...";
+      break;
+    }
+    if (code_point <= first) continue;
+    source += c;
+    if (code_point < column && !continues_code_point(c)) caret += c == '\t' ? '\t' : ' ';
+  }
+  return "\n  " + printable(source) + "\n  " + caret + "^";
+}
+
+/// Finds where tables and arrays are nested deeper than kMaxDepth, before toml++ builds them. Exact up to the first syntax
+/// error, which toml++ reports: names of a header, dots of keys, and brackets count; those in strings and comments do not.
+class DepthScan {
+ public:
+  explicit DepthScan(std::string_view text) : text_(text) {}
+
+  /// The place of the dot or bracket that goes too deep; nothing where none does.
+  std::optional<toml::source_position> first_too_deep() {
+    for (std::size_t next = 0; at_ < text_.size(); at_ = next) {
+      next = at_ + token_length();
+      if (!take(text_[at_])) return position();
+    }
+    return {};
+  }
+
+ private:
+  /// One open bracket, or the document.
+  struct Level {
+    std::size_t depth;      // tables and arrays around what it holds
+    bool is_array;
+    bool in_value = false;  // past a '=': a dot is no new table
+    std::size_t dots = 0;   // of the key before
+  };
+
+  /// Strings and comments are one token, everything else is read by the character.
+  std::size_t token_length() const {
+    const char c = text_[at_];
+    if (c == '#') return std::min(text_.find('\n', at_), text_.size()) - at_;
+    if (c != '"' && c != '\'') return 1;
+    const std::string quotes(3, c);
+    const bool is_long = text_.substr(at_).starts_with(quotes);
+    for (std::size_t k = at_ + (is_long ? 3 : 1); k < text_.size(); ++k) {
+      if (c == '"' && text_[k] == '\\') {
+        ++k;
+      } else if (is_long && text_.substr(k).starts_with(quotes)) {
+        k += 3;
+        // Up to two more quotes belong to the text.
+        for (int more = 0; more < 2 && k < text_.size() && text_[k] == c; ++more) ++k;
+        return k - at_;
+      } else if (!is_long && (text_[k] == c || text_[k] == '\n')) {
+        return k + (text_[k] == c ? 1 : 0) - at_;
+      }
+    }
+    return text_.size() - at_;
+  }
+
+  /// False where it goes too deep.
+  bool take(char c) {
+    Level& level = levels_.back();
+    const bool at_top = levels_.size() == 1;
+    if (c == '\n' && at_top) {
+      level.in_value = false;
+      level.dots = header_ = 0;
+      return true;
+    }
+    switch (c) {
+      case '.':
+        if (!level.in_value) ++level.dots;
+        return level.depth + header_ + level.dots <= kMaxDepth;
+      case '=':
+        level.in_value = true;
+        return true;
+      case ',':
+        level.in_value = level.is_array;
+        level.dots = 0;
+        return true;
+      case '[':
+        if (at_top && !level.in_value) {  // a header; two brackets: an array of tables
+          if (++header_ == 1) level.depth = 0;
+          return header_ <= kMaxDepth;
+        }
+        [[fallthrough]];
+      case '{': {
+        const std::size_t depth = level.depth + level.dots + 1;
+        levels_.push_back({depth, c == '[', c == '['});
+        return depth <= kMaxDepth;
+      }
+      case ']':
+      case '}':
+        if (!at_top) {
+          levels_.pop_back();
+        } else if (header_ > 0) {
+          level.depth = header_ + level.dots;
+          level.dots = header_ = 0;
+        }
+        return true;
+      default:
+        return true;
+    }
+  }
+
+  toml::source_position position() const {
+    const std::string_view before = text_.substr(0, at_);
+    const std::size_t line_begin = before.rfind('\n') + 1;  // 0 where there is no line before
+    const auto code_points =
+        std::count_if(before.begin() + static_cast<std::ptrdiff_t>(line_begin), before.end(),
+                      [](char c) { return !continues_code_point(c); });
+    return {static_cast<toml::source_index>(std::count(before.begin(), before.end(), '\n') + 1),
+            static_cast<toml::source_index>(code_points + 1)};
+  }
+
+  std::string_view text_;
+  std::size_t at_ = 0;
+  std::vector<Level> levels_ = {{0, false}};
+  std::size_t header_ = 0;  // open brackets of a header
+};
 
 std::string describe(const toml::node& node) {
   if (const auto* value = node.as_string()) return "the string \"" + shortened(value->get()) + "\"";
@@ -151,6 +287,10 @@ std::string with_range(const std::string& what, const std::string& range) {
 bool contains(const NumberRange& range, double value) {
   return std::isfinite(value) && value <= range.max &&
          (range.exclusive_min ? value > range.min : value >= range.min);
+}
+
+[[noreturn]] void fail_size(const std::string& name, std::uintmax_t size) {
+  throw ConfigError(fmt::format("{}: {} bytes; a config has at most {}", name, size, kMaxDocumentBytes));
 }
 
 /// Minimal JSON-like text of a value; toml++ keeps the keys of a table sorted.
@@ -258,24 +398,13 @@ struct TomlTable::Document {
     fail_at(name, lines, place, message);
   }
 
-  /// Throws "name:line:col: message", the source line, and a caret under the column (toml++ counts code
-  /// points).
+  /// Throws "name:line:col: message", the source line, and a caret under the column.
   [[noreturn]] static void fail_at(const std::string& name, const std::vector<std::string>& lines,
                                    const toml::source_position& place, const std::string& message) {
     const std::size_t line = std::max<std::size_t>(place.line, 1);
     const std::size_t column = std::max<std::size_t>(place.column, 1);
     std::string text = fmt::format("{}:{}:{}: {}", name, line, column, printable(message));
-    if (line <= lines.size()) {
-      const std::string source = printable(lines[line - 1]);
-      std::string caret;
-      std::size_t code_points = 0;
-      for (std::size_t i = 0; i < source.size() && code_points + 1 < column; ++i) {
-        if ((static_cast<unsigned char>(source[i]) & 0xC0) == 0x80) continue;
-        caret += source[i] == '\t' ? '\t' : ' ';
-        ++code_points;
-      }
-      text += "\n  " + source + "\n  " + caret + "^";
-    }
+    if (line <= lines.size()) text += excerpt(lines[line - 1], column);
     throw ConfigError(text);
   }
 
@@ -283,21 +412,20 @@ struct TomlTable::Document {
     node.values = &values;
     for (const auto& [key, value] : values) {
       const std::string key_text(key.str());
-      const std::string full_name = node.full_name.empty() ? key_text : node.full_name + "." + key_text;
-      const auto make_child = [&](const toml::table& child, const std::string& title) {
+      const auto make_child = [&, &key = key](const toml::table& child, std::string_view open, std::string_view close) {
         auto result = std::make_unique<Node>();
-        result->title = title;
-        result->full_name = full_name;
+        result->full_name = node.full_name.empty() ? shortened(key_text) : node.full_name + "." + shortened(key_text);
+        result->title = fmt::format("{}{}{}", open, result->full_name, close);
         result->place = child.source().begin.line > 0 ? child.source().begin : key.source().begin;
         build(*result, child);
         return result;
       };
       if (const toml::table* table = value.as_table()) {
-        node.tables[key_text] = make_child(*table, "[" + full_name + "]");
+        node.tables[key_text] = make_child(*table, "[", "]");
       } else if (const toml::array* array = value.as_array();
                  array != nullptr && !array->empty() && array->is_homogeneous(toml::node_type::table)) {
         for (const toml::node& element : *array) {
-          node.table_arrays[key_text].push_back(make_child(*element.as_table(), "[[" + full_name + "]]"));
+          node.table_arrays[key_text].push_back(make_child(*element.as_table(), "[[", "]]"));
         }
       }
     }
@@ -392,6 +520,10 @@ TomlTable::TomlTable(std::shared_ptr<Document> document, const Node* node)
     : document_(std::move(document)), node_(node) {}
 
 TomlTable TomlTable::load(const std::filesystem::path& path) {
+  // Larger files are refused unread.
+  std::error_code ignored;
+  const std::uintmax_t size = std::filesystem::file_size(path, ignored);
+  if (!ignored && size > kMaxDocumentBytes) fail_size(path.string(), size);
   std::vector<std::byte> bytes;
   try {
     bytes = read_whole_file(path);
@@ -402,10 +534,7 @@ TomlTable TomlTable::load(const std::filesystem::path& path) {
 }
 
 TomlTable TomlTable::parse(std::string_view text, const std::string& name) {
-  if (text.size() > kMaxDocumentBytes) {
-    throw ConfigError(
-        fmt::format("{}: {} bytes; a config has at most {}", name, text.size(), kMaxDocumentBytes));
-  }
+  if (text.size() > kMaxDocumentBytes) fail_size(name, text.size());
   auto document = std::make_shared<Document>();
   document->name = name;
   for (std::size_t begin = 0; begin <= text.size();) {
@@ -414,6 +543,9 @@ TomlTable TomlTable::parse(std::string_view text, const std::string& name) {
     if (line.ends_with('\r')) line.remove_suffix(1);
     document->lines.emplace_back(line);
     begin = end + 1;
+  }
+  if (const auto place = DepthScan(text).first_too_deep()) {
+    document->fail_at(*place, fmt::format("syntax: more than {} tables and arrays within each other", kMaxDepth));
   }
   try {
     document->values = toml::parse(text, name);
@@ -610,7 +742,7 @@ void TomlTable::finish() const {
     hint = fmt::format("; known here: {}", fmt::join(known, ", "));
   }
   document_->fail_at(unknown->key->source().begin,
-                     fmt::format("unknown key '{}' {}{}", key, unknown->node->in_title(), hint));
+                     fmt::format("unknown key '{}' {}{}", shortened(key), unknown->node->in_title(), hint));
 }
 
 void TomlTable::fail(std::string_view key, const std::string& message) const {

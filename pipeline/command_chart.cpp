@@ -58,6 +58,8 @@ class ChartMaker {
   ChartMaker(const ChartOptions& options, StageContext& context, fs::path runs)
       : options_(&options), context_(&context), runs_(std::move(runs)), processor_(processor_name()) {
     make_folder(runs_);
+    require_writable(runs_ / "picture.exr");  // before hours of work
+    require_writable(options.output / "chart.csv");
     use_variant({});
     const SceneConfig& scene = job_->config();
     const ViewConfig& view = find_view(scene, options.view);

@@ -5,6 +5,7 @@
 #include <optional>
 #include <span>
 
+#include "formats/atomic_file.h"
 #include "formats/input_error.h"
 #include "pipeline/commands.h"
 #include "pipeline/job.h"
@@ -39,7 +40,6 @@ void apply_overrides(const RenderOptions& options, PictureRequest& request) {
 }
 
 void write_picture(const PictureResult& picture, const std::filesystem::path& output, Job& job) {
-  make_folder(output.parent_path());
   write_exr(output, picture.image);
   write_picture_report(output, picture);
   job.add_artifact(output);
@@ -110,6 +110,11 @@ int render_within(double tolerance, const RenderOptions& options, Job& job) {
 int render_command(const RenderOptions& options, const CommonOptions& common) {
   if (options.output.extension() != ".exr") throw ConfigError("-o: expected a file name that ends in .exr");
   Job job(common);
+  // Hours of work later would be late to find out.
+  make_folder(options.output.parent_path());
+  for (const char* extension : {".exr", ".png", ".json"}) {
+    require_writable(std::filesystem::path(options.output).replace_extension(extension));
+  }
   if (options.tolerance) return render_within(*options.tolerance, options, job);
   SceneJob scene(options.scene, job.context(), {.order = options.order, .fabric = {}, .blend = {}, .surface_method = {}});
   PictureRequest request = scene.request(find_view(scene.config(), options.view));

@@ -78,6 +78,7 @@ int run_command(const RunOptions& options, const CommonOptions& common) {
   SceneJob scene(options.scene, job.context(), {.order = options.order, .fabric = {}, .blend = {}, .surface_method = {}});
   const fs::path folder = options.output.empty() ? fs::path("out") / options.scene.stem() : options.output;
   make_folder(folder);
+  require_writable(folder / (options.scene.stem().string() + ".exr"));  // before hours of work
 
   for (const ViewConfig& view : scene.config().views) {
     const std::string name = view.name.empty() ? options.scene.stem().string() : view.name;

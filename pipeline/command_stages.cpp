@@ -20,12 +20,22 @@ void require_pack_or_nothing(const fs::path& place) {
   }
 }
 
-/// Copies a pack out of the cache: beside its place, then into it as a whole.
-void copy_pack(const fs::path& from, const fs::path& to) {
-  // A last slash is no part of the name.
-  const fs::path place = to.has_filename() ? to : to.parent_path();
+/// A last slash is no part of a folder's name.
+fs::path without_slash(const fs::path& folder) {
+  return folder.has_filename() ? folder : folder.parent_path();
+}
+
+void require_place_for_pack(const fs::path& folder) {
+  const fs::path place = without_slash(folder);
   require_pack_or_nothing(place);
   make_folder(place.parent_path());
+  require_writable(place.parent_path() / kManifestName);
+}
+
+/// Copies a pack out of the cache: beside its place, then into it as a whole.
+void copy_pack(const fs::path& from, const fs::path& to) {
+  const fs::path place = without_slash(to);
+  require_place_for_pack(to);
   TemporaryPath copy(place);
   make_folder(copy.path());
   for (const auto& entry : fs::directory_iterator(from)) {
@@ -39,6 +49,7 @@ void copy_pack(const fs::path& from, const fs::path& to) {
 
 int stage_command(const StageOptions& options, const CommonOptions& common) {
   Job job(common);
+  if (options.output) require_place_for_pack(*options.output);  // before hours of work
   FabricStages stages(options.fabric, job.context());
   std::optional<Artifact> artifact;
   switch (options.target) {

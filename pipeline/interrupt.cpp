@@ -10,10 +10,9 @@
 #include <chrono>
 #include <thread>
 
-namespace heddle {
+#include "formats/atomic_file.h"
 
-// STUB, to be replaced by the function of the same name in formats/atomic_file.h.
-void remove_own_temporaries() noexcept {}
+namespace heddle {
 
 namespace {
 

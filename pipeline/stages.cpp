@@ -14,6 +14,7 @@
 #include "formats/content_hash.h"
 #include "formats/id_volume_file.h"
 #include "formats/input_error.h"
+#include "formats/memory_need.h"
 #include "formats/tensor_file.h"
 #include "pipeline/artifact_record.h"
 #include "pipeline/interrupt.h"
@@ -56,6 +57,14 @@ TransferChunk read_transfer_chunk(const fs::path& path, std::uint32_t first_cell
   chunk.paths = file.get<std::uint32_t>("paths", {cells});
   chunk.cones = get_cones(file, cells, bands * bands);
   return chunk;
+}
+
+/// Says what a stage will need of memory, where that is much, and throws MemoryError where the machine has less.
+void announce(Console* console, const std::string& stage, double items, const char* unit, double bytes) {
+  constexpr double kMuch = 1e9;
+  const auto whole = static_cast<std::uint64_t>(bytes);
+  if (bytes >= kMuch) console->say(fmt::format("{}: {:.3g} {}, {} of memory", stage, items, unit, memory_text(whole)));
+  require_memory(whole, fmt::format("{} of {:.3g} {}", stage, items, unit));
 }
 
 /// Advances a progress of 100 items by the share done.
@@ -259,8 +268,18 @@ Stage FabricStages::synth_stage() const {
 Artifact FabricStages::synth() {
   const Stage stage = synth_stage();
   return artifact_of(stage, [&](const fs::path& path, StageResult&) {
+    const FabricConfig& config = document_.config;
     try {
-      write_exemplar(path, synthesize(document_.config), stage.metadata);
+      const ExemplarForecast forecast = forecast_exemplar(config);
+      announce(context_->console, "synth", forecast.segments, "segments", forecast.bytes);
+      const auto yarns = static_cast<std::uint64_t>(config.weave.ends) * config.repeats_x +
+                         static_cast<std::uint64_t>(config.weave.picks) * config.repeats_y;
+      Progress progress(*context_->console, "synth", "yarns", yarns);
+      const auto yarn_done = [&progress] {
+        stop_if_interrupted();
+        progress.advance(1);
+      };
+      write_exemplar(path, synthesize(config, yarn_done), stage.metadata);
     } catch (const std::invalid_argument& error) {
       throw ConfigError(fmt::format("{}: {}", document_.file.string(), error.what()));
     }
@@ -373,6 +392,9 @@ Artifact FabricStages::maps() {
   const Stage stage = maps_stage();
   const Artifact artifact = artifact_of(stage, [&](const fs::path& path, StageResult& result) {
     const auto segments = static_cast<std::uint32_t>(exemplar().segment_count());
+    // All maps, and two copies while they are written.
+    const double map_bytes = document_.config.light_from_both_sides ? 2048 : 1024;
+    announce(context_->console, "visibility", segments, "segments", 3 * map_bytes * segments);
     const auto compute = [&](const fs::path& file, std::uint32_t first, std::uint32_t end) {
       compute_maps(stage, file, first, end);
     };
@@ -480,6 +502,9 @@ Artifact FabricStages::transfer(std::optional<int> order) {
   const Artifact artifact = artifact_of(stage, [&](const fs::path& path, StageResult& result) {
     const auto work = transfer_work(settings);
     const std::uint32_t cells = work->baker->cell_count();
+    // Matrices of all cells: chunks, what is assembled of them, and two copies while that is written.
+    const double bands = (settings.order + 1) * (settings.order + 1);
+    announce(context_->console, "transfer", cells, "cells", 3 * 3 * sizeof(float) * bands * bands * cells);
     const auto compute = [&](const fs::path& file, std::uint32_t first, std::uint32_t end) {
       work->compute(file, first, end);
     };

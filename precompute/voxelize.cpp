@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "formats/input_error.h"
+#include "formats/memory_need.h"
 
 namespace heddle {
 namespace {
@@ -51,6 +52,8 @@ IdVolume voxelize(const Exemplar& exemplar, const VolumeSettings& settings) {
     volume.size[a] = static_cast<int>(voxels);
     volume.voxel_mm[a] = extent[a] / voxels;
   }
+  // Ids and distances here, the grid and its bytes when it is written.
+  require_memory(static_cast<std::uint64_t>(4 * sizeof(float) * count), fmt::format("a volume of {:.3g} voxels", count));
   volume.ids.assign(static_cast<std::size_t>(count), -1);
   std::vector<float> nearest(volume.ids.size(),
                              std::numeric_limits<float>::infinity());  // squared, to the axis

@@ -25,10 +25,16 @@ Shell make_shell(const ClothMesh& mesh, const Exemplar& exemplar) {
                static_cast<double>(exemplar.z_max) + margin);
 }
 
-TriangleMesh scaled_mesh(const ObjMesh& obj, double mm_per_unit) {
+ClothMesh read_cloth_mesh(const MeshFile& file, double uv_size_mm) {
+  const ObjMesh obj = read_obj(file.path, {file.mm_per_unit, uv_size_mm});
+  return cloth_mesh_of(obj, file.path.string(), file.mm_per_unit, uv_size_mm);
+}
+
+TriangleMesh read_black_mesh(const MeshFile& file) {
+  const ObjMesh obj = read_obj(file.path, {.mm_per_unit = file.mm_per_unit});
   TriangleMesh mesh;
   for (const std::array<float, 3>& p : obj.positions) {
-    mesh.positions.push_back((mm_per_unit * Vec3d(p[0], p[1], p[2])).cast<float>());
+    mesh.positions.push_back((file.mm_per_unit * Vec3d(p[0], p[1], p[2])).cast<float>());
   }
   mesh.triangles = obj.triangles;
   return mesh;
@@ -140,8 +146,7 @@ ClothScene make_cloth_scene(const SceneConfig& config,
   std::vector<ClothPiece> pieces;
   std::vector<SurfaceCloth> surfaces;
   for (const ClothConfig& cloth : config.cloths) {
-    ClothMesh mesh = cloth.mesh ? cloth_mesh_of(read_obj(cloth.mesh->path), cloth.mesh->path.string(),
-                                                cloth.mesh->mm_per_unit, cloth.uv_size_mm)
+    ClothMesh mesh = cloth.mesh ? read_cloth_mesh(*cloth.mesh, cloth.uv_size_mm)
                                 : flat_cloth(cloth.flat_width_mm, cloth.flat_height_mm, flat_cells(cloth));
     if (cloth.surface) {
       surfaces.emplace_back(cloth.surface->model, std::move(mesh));
@@ -150,8 +155,7 @@ ClothScene make_cloth_scene(const SceneConfig& config,
     }
   }
   std::vector<TriangleMesh> black;
-  for (const MeshFile& mesh : config.meshes)
-    black.push_back(scaled_mesh(read_obj(mesh.path), mesh.mm_per_unit));
+  for (const MeshFile& mesh : config.meshes) black.push_back(read_black_mesh(mesh));
   return {std::move(pieces), std::move(black), std::move(surfaces)};
 }
 

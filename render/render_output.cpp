@@ -1,8 +1,10 @@
 #include "render/render_output.h"
 
+#include <algorithm>
 #include <array>
 
 #include "formats/input_error.h"
+#include "render/pixel_sums.h"
 
 namespace heddle {
 
@@ -32,6 +34,16 @@ void add_color(Image& image, const std::string& layer, const std::vector<Rgb>& v
 }
 
 }  // namespace
+
+std::uint64_t picture_bytes(int width_px, int height_px, int spp, bool with_fiber_layers) {
+  const std::uint64_t colors = spp >= 2 ? 6 : 3;
+  const std::uint64_t fibers = with_fiber_layers ? 2 * sizeof(std::uint32_t) + 2 * sizeof(Vec3) + sizeof(float) : 0;
+  const std::uint64_t frame = colors * sizeof(Rgb) + sizeof(float) + fibers;
+  // Writing rounds some layers to halves beside the image, and makes the preview.
+  const std::uint64_t written = colors * sizeof(Rgb) / 2 + sizeof(Rgb);
+  const std::uint64_t pixel = frame + std::max<std::uint64_t>(sizeof(PixelSums), frame + written);
+  return pixel * static_cast<std::uint64_t>(width_px) * static_cast<std::uint64_t>(height_px);
+}
 
 Image image_of(const FrameBuffers& frame, const std::map<std::string, std::string>& metadata) {
   Image image;

@@ -56,6 +56,10 @@ struct FrameBuffers {
 /// traced); 0 ends the picture. It is the same as if all its samples had been asked for at once.
 using MoreSamples = std::function<int(const FrameBuffers&)>;
 
+/// Bytes of memory that a picture takes at its peak: the sums of its pixels with the frame that they are stored in, or that
+/// with the image that is written, whichever is more.
+std::uint64_t picture_bytes(int width_px, int height_px, int spp, bool with_fiber_layers);
+
 Image image_of(const FrameBuffers& frame, const std::map<std::string, std::string>& metadata);
 
 /// The colours of a layer ("" = beauty, "half0", ...) back from an image. Errors: FileError where a channel

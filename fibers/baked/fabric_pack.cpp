@@ -10,6 +10,7 @@
 #include "fibers/cloth/bundle_tangents.h"
 #include "formats/atomic_file.h"
 #include "formats/input_error.h"
+#include "formats/json_text.h"
 
 namespace heddle {
 namespace {
@@ -81,6 +82,9 @@ PackManifest read_manifest(const std::filesystem::path& folder) {
   if (size > kMaxManifestBytes) throw FileError(path.string() + ": too large for a pack manifest");
   const std::vector<std::byte> bytes = read_whole_file(path);
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  if (is_nested_too_deeply(text)) {
+    throw FileError(fmt::format("{}: not a pack manifest: JSON nested deeper than {}", path.string(), kMaxJsonDepth));
+  }
   try {
     return from_json(Json::parse(text), path.string());
   } catch (const Json::exception& broken) {

@@ -104,7 +104,8 @@ Transfer read_transfer(const std::filesystem::path& path) {
   const std::string& sides = file.metadata_value("light_from");
   if (sides != "face" && sides != "both") throw FileError(path.string() + ": light_from is neither face nor both");
   t.both_sides = sides == "both";
-  const std::uint64_t count = file.shape("paths").at(0);
+  const std::uint64_t count = file.get<std::uint32_t>("paths", {0}).size();
+  if (count == 0) throw FileError(path.string() + ": no cells");
   const std::vector<std::uint64_t>& error_shape = file.shape("standard_error");
   if (error_shape.size() != 3 || error_shape[1] < 1 || error_shape[1] > 11) {
     throw FileError(path.string() + ": expected standard_error of shape [cell][band][3] with 1 to 11 bands");
@@ -115,7 +116,7 @@ Transfer read_transfer(const std::filesystem::path& path) {
   t.standard_error = file.get<float>("standard_error", {count, error_shape[1], 3});
   t.paths = file.get<std::uint32_t>("paths", {count});
   t.cones = get_cones(file, count, n);
-  t.cell_of_segment = file.get<std::uint32_t>("cell_of_segment", {file.shape("cell_of_segment").at(0)});
+  t.cell_of_segment = file.get<std::uint32_t>("cell_of_segment", {0});
   for (const std::uint32_t cell : t.cell_of_segment) {
     if (cell >= count) throw FileError(fmt::format("{}: cell {} of {}", path.string(), cell, count));
   }

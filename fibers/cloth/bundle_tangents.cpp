@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <compare>
 #include <utility>
 
 namespace heddle {
@@ -11,6 +12,9 @@ namespace {
 
 constexpr float kBundleRadii = 4;
 constexpr float kLeastCosine = 0.9F;  // between tangents of one bundle
+
+// Columns along an axis. Those of any real fabric are fewer; more would be finer than a float tells places apart.
+constexpr float kMostColumns = 4096;
 
 }  // namespace
 
@@ -26,22 +30,31 @@ std::vector<Vec3> bundle_tangents(const Exemplar& exemplar) {
   }
 
   // Columns over the period, at least `reach` wide, so that a segment's neighbours lie in its own column and those around it.
-  const auto columns = [reach](float period) { return std::max(1, static_cast<int>(period / reach)); };
+  const auto columns = [reach](float period) {
+    return std::max(1, static_cast<int>(std::min(period / reach, kMostColumns)));
+  };
   const int nx = columns(exemplar.width_mm);
   const int ny = columns(exemplar.height_mm);
   const auto column_of = [](float place, float period, int count) {
     const float share = place / period - std::floor(place / period);
     return std::min(count - 1, static_cast<int>(share * static_cast<float>(count)));
   };
-  std::vector<std::vector<std::uint32_t>> members(static_cast<std::size_t>(nx * ny));
   const auto place_of = [&](std::uint32_t s) {
     return std::pair{column_of(midpoint[s].x(), exemplar.width_mm, nx),
                      column_of(midpoint[s].y(), exemplar.height_mm, ny)};
   };
+  // Most columns of sparse yarns are empty: the segments are sorted by their column, instead of a list for each column.
+  struct Member {
+    int column;
+    std::uint32_t segment;
+    auto operator<=>(const Member&) const = default;
+  };
+  std::vector<Member> members;
   for (std::uint32_t s = 0; s < segments; ++s) {
     const auto [x, y] = place_of(s);
-    members[static_cast<std::size_t>(y * nx + x)].push_back(s);
+    members.push_back({y * nx + x, s});
   }
+  std::sort(members.begin(), members.end());
   // With fewer than three columns around a period, a step to either side would meet the same column twice.
   const auto first_step = [](int count) { return count > 2 ? -1 : 0; };
   const auto last_step = [](int count) { return count > 1 ? 1 : 0; };
@@ -53,8 +66,10 @@ std::vector<Vec3> bundle_tangents(const Exemplar& exemplar) {
     Vec3 sum = tangent[s];
     for (int dy = first_step(ny); dy <= last_step(ny); ++dy) {
       for (int dx = first_step(nx); dx <= last_step(nx); ++dx) {
-        for (const std::uint32_t other :
-             members[static_cast<std::size_t>((y + dy + ny) % ny * nx + (x + dx + nx) % nx)]) {
+        const int column = (y + dy + ny) % ny * nx + (x + dx + nx) % nx;
+        for (auto member = std::lower_bound(members.begin(), members.end(), Member{column, 0});
+             member != members.end() && member->column == column; ++member) {
+          const std::uint32_t other = member->segment;
           if (other == s) continue;
           Vec3 apart = midpoint[other] - midpoint[s];
           apart.x() -= exemplar.width_mm * std::round(apart.x() / exemplar.width_mm);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "formats/input_error.h"
 #include "formats/tensor_file.h"
@@ -24,6 +25,51 @@ void validate_layout(const Exemplar& e, const std::string& name) {
   for (std::size_t f = 0; f < fibers; ++f) {
     if (e.first_point[f + 1] < e.first_point[f] + 3 || e.first_point[f + 1] > e.points.size()) {
       broken(name, 1, fmt::format("fiber {} has fewer than 2 segments", f));
+    }
+  }
+}
+
+constexpr float kMaxHeightMm = 1e3F;
+constexpr float kMinRadiusMm = 1e-6F;
+
+// Invariant 2. Code that comes later walks over the copies of a fiber by whole tiles.
+void validate_sizes(const Exemplar& e, const std::string& name) {
+  const auto is_length = [](float length) { return length > 0 && length <= kMaxTileMm; };
+  if (!is_length(e.width_mm) || !is_length(e.height_mm)) {
+    broken(name, 2, fmt::format("a tile of {} x {} mm is not between 0 and {} mm", e.width_mm, e.height_mm, kMaxTileMm));
+  }
+  for (std::size_t f = 0; f < e.fiber_count(); ++f) {
+    const float r = e.radius_mm[f];
+    if (!(r >= kMinRadiusMm && r < 0.5F * std::min(e.width_mm, e.height_mm))) {
+      broken(name, 2, fmt::format("fiber {} has radius {} mm", f, r));
+    }
+    for (std::uint32_t p = e.first_point[f]; p < e.first_point[f + 1]; ++p) {
+      const Vec3& point = e.points[p];
+      const auto is_near = [](float x, float period) { return x >= -period && x <= 2 * period; };
+      if (!is_near(point.x(), e.width_mm) || !is_near(point.y(), e.height_mm) || !(std::abs(point.z()) <= kMaxHeightMm)) {
+        broken(name, 2, fmt::format("point {} of fiber {} lies at ({}, {}, {}) mm, far from a tile of {} x {} mm",
+                                    p - e.first_point[f], f, point.x(), point.y(), point.z(), e.width_mm, e.height_mm));
+      }
+    }
+  }
+}
+
+// Invariant 6.
+void validate_scattering(const Exemplar& e, const std::string& name) {
+  if (e.scattering.size() > kMaxMaterials) {
+    broken(name, 5, fmt::format("{} materials (at most {})", e.scattering.size(), kMaxMaterials));
+  }
+  for (std::size_t m = 0; m < e.scattering.size(); ++m) {
+    const FiberScattering& fiber = e.scattering[m];
+    if (fiber.isotropic_white) continue;
+    const auto is_share = [](const Rgbd& color) { return (color >= 0).all() && (color <= 1).all(); };
+    const auto is_width = [](double width, double most_deg) { return width >= radians(0.01) && width <= radians(most_deg); };
+    if (!is_share(fiber.color_r) || !is_share(fiber.color_tt)) {
+      broken(name, 6, fmt::format("a colour of material {} is outside [0, 1]", m));
+    }
+    if (!is_width(fiber.beta_r, 90) || !is_width(fiber.beta_tt, 90) || !is_width(fiber.gamma_tt, 360)) {
+      broken(name, 6, fmt::format("material {} has lobes of {}, {} and {} radians", m, fiber.beta_r, fiber.beta_tt,
+                                  fiber.gamma_tt));
     }
   }
 }
@@ -51,17 +97,10 @@ void index_segments(Exemplar& e) {
 
 void validate_exemplar(const Exemplar& e, const std::string& name) {
   validate_layout(e, name);
-  if (!(e.width_mm > 0 && e.width_mm < 1e4F && e.height_mm > 0 && e.height_mm < 1e4F)) {
-    broken(name, 2, "the tile's size is not between 0 and 10,000 mm");
-  }
-  for (std::size_t i = 0; i < e.points.size(); ++i) {
-    if (!e.points[i].allFinite()) broken(name, 2, fmt::format("point {} is not finite", i));
-  }
+  validate_sizes(e, name);
+  validate_scattering(e, name);
   for (std::size_t f = 0; f < e.fiber_count(); ++f) {
     const float r = e.radius_mm[f];
-    if (!(r > 0 && r < 0.5F * std::min(e.width_mm, e.height_mm))) {
-      broken(name, 2, fmt::format("fiber {} has radius {} mm", f, r));
-    }
     const Vec3 period = e.points[e.first_point[f + 1] - 1] - e.points[e.first_point[f]];
     const float tolerance = 1e-5F * std::max(e.width_mm, e.height_mm);
     if ((period - Vec3(e.width_mm, 0, 0)).norm() > tolerance && (period - Vec3(0, e.height_mm, 0)).norm() > tolerance) {

@@ -5,10 +5,12 @@
 // first point shifted by one period along its yarn, so that the curve goes on through every copy of the tile under one id.
 // Invariants, checked by validate_exemplar():
 //   1. first_point is ascending, starts at 0, ends at points.size(), and every fiber has at least 2 segments;
-//   2. every number is finite, radii are positive and below half the tile;
+//   2. the tile is at most 10 m wide and high; points lie within one tile around it and 1 m of its plane; radii are at least
+//      1 nm and below half the tile;
 //   3. the last point of a fiber is its first point shifted by (width, 0, 0) or (0, height, 0);
 //   4. no segment is shorter than a thousandth of its radius;
-//   5. materials are below material_count.
+//   5. materials are below material_count, and those are at most 64;
+//   6. colours lie within [0, 1], deviations of lobes between 0.01 degrees and 90 (azimuth: 360).
 // Tested in tests/fibers/cloth/exemplar_test.cpp.
 
 #include <cstdint>
@@ -24,6 +26,10 @@ namespace heddle {
 
 /// Id that belongs to no fiber.
 inline constexpr std::uint32_t kNoFiber = 0xffffffffU;
+
+inline constexpr float kMaxTileMm = 1e4F;
+/// Each takes 0.1 s and some memory when a pack is opened.
+inline constexpr std::size_t kMaxMaterials = 64;
 
 struct Exemplar {
   float width_mm = 0;   // period along x

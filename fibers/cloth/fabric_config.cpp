@@ -1,12 +1,22 @@
 #include "fibers/cloth/fabric_config.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <stdexcept>
+
+#include "fibers/cloth/exemplar.h"
 
 namespace heddle {
 namespace {
 
 constexpr double kMmPerUm = 1e-3;
+
+void check_tile(const TomlTable& weave, std::string_view key, double size_mm) {
+  if (size_mm <= kMaxTileMm) return;
+  weave.fail(key, fmt::format("expected a tile of at most {} mm, found {:g} mm: yarns of a repeat x repeats x spacing_mm",
+                              kMaxTileMm, size_mm));
+}
 
 Rgbd color(const TomlTable& table, std::string_view key) {
   const auto c = table.number3(key, {.min = 0, .max = 1});
@@ -84,9 +94,13 @@ FabricConfig read_fabric_config(const TomlTable& document) {
 
   const TomlTable fibers = document.table("fiber");
   for (const std::string& name : fibers.table_names()) config.fibers.push_back(read_fiber(fibers.table(name), name));
-  if (config.fibers.empty()) document.fail("fiber", "expected at least one [fiber.NAME] table");
+  if (config.fibers.empty() || config.fibers.size() > kMaxMaterials) {
+    document.fail("fiber", fmt::format("expected 1 to {} tables [fiber.NAME]", kMaxMaterials));
+  }
   config.warp = read_yarn(document.table("warp"), config);
   config.weft = read_yarn(document.table("weft"), config);
+  check_tile(weave, "repeats_x", config.weave.ends * config.repeats_x * config.warp.spacing_mm);
+  check_tile(weave, "repeats_y", config.weave.picks * config.repeats_y * config.weft.spacing_mm);
   return config;
 }
 

@@ -75,6 +75,12 @@ SnappedTwist snap_twist(const YarnConfig& yarn, double period_mm) {
           static_cast<int>(std::lround(yarn.ply_turns_per_mm * period_mm))};
 }
 
+double segments_per_fiber(const YarnConfig& yarn, double period_mm, double segment_mm) {
+  const SnappedTwist twist = snap_twist(yarn, period_mm);
+  const int turns = std::max(std::abs(twist.yarn_turns + twist.ply_turns), std::abs(twist.yarn_turns));
+  return std::max({4.0, std::ceil(period_mm / segment_mm), std::ceil(kPointsPerTurn * turns)});
+}
+
 void add_fibers_of_yarn(const YarnConfig& yarn, double fiber_radius_mm, const YarnPath& path, double segment_mm,
                         std::uint64_t seed, std::uint32_t yarn_index, Exemplar& exemplar) {
   const double period = path.length_mm();
@@ -82,9 +88,7 @@ void add_fibers_of_yarn(const YarnConfig& yarn, double fiber_radius_mm, const Ya
   const PlyShape shape = ply_shape(yarn.plies);
   const double half_width = 0.5 * yarn.width_mm - fiber_radius_mm;
   const double half_height = 0.5 * yarn.height_mm - fiber_radius_mm;
-  const int turns = std::max(std::abs(twist.yarn_turns + twist.ply_turns), std::abs(twist.yarn_turns));
-  const int segments = std::max({4, static_cast<int>(std::ceil(period / segment_mm)),
-                                 static_cast<int>(std::ceil(kPointsPerTurn * turns))});
+  const int segments = static_cast<int>(segments_per_fiber(yarn, period, segment_mm));
   // A slope of s along each of the two cross axes tilts the fiber by atan(sqrt(2) s).
   const double slope_rms = std::tan(yarn.wander_rms) / std::sqrt(2.0);
   const double golden_angle = kPi * (3 - std::sqrt(5.0));

@@ -20,6 +20,9 @@ struct SnappedTwist {
 };
 SnappedTwist snap_twist(const YarnConfig& yarn, double period_mm);
 
+/// Pieces of each fiber over one period of the yarn: as short as the config asks for, and enough to follow its twist.
+double segments_per_fiber(const YarnConfig& yarn, double period_mm, double segment_mm);
+
 /// Appends the fibers of one yarn to the exemplar (points, radius, material).
 void add_fibers_of_yarn(const YarnConfig& yarn, double fiber_radius_mm, const YarnPath& path, double segment_mm,
                         std::uint64_t seed, std::uint32_t yarn_index, Exemplar& exemplar);

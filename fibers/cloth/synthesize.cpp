@@ -1,25 +1,58 @@
 #include "fibers/cloth/synthesize.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 #include "fibers/cloth/fibers_of_yarn.h"
 #include "fibers/cloth/yarn_paths.h"
+#include "formats/memory_need.h"
 
 namespace heddle {
 
-Exemplar synthesize(const FabricConfig& config) {
+namespace {
+
+// A point is stored as 3 floats, a segment as two indices; writing copies them twice.
+constexpr double kBytesPerSegment = 3 * 20;
+constexpr double kMostSegments = 0x1p31;
+
+}  // namespace
+
+ExemplarForecast forecast_exemplar(const FabricConfig& config) {
+  const double ends = static_cast<double>(config.weave.ends) * config.repeats_x;
+  const double picks = static_cast<double>(config.weave.picks) * config.repeats_y;
+  const auto segments_of = [&](const YarnConfig& yarn, double yarns, double period_mm) {
+    return yarns * yarn.plies * yarn.fibers_per_ply * segments_per_fiber(yarn, period_mm, config.segment_mm);
+  };
+  const double segments = segments_of(config.warp, ends, picks * config.weft.spacing_mm) +
+                          segments_of(config.weft, picks, ends * config.warp.spacing_mm);
+  return {segments, kBytesPerSegment * segments};
+}
+
+Exemplar synthesize(const FabricConfig& config, const std::function<void()>& yarn_done) {
+  const ExemplarForecast forecast = forecast_exemplar(config);
+  if (forecast.segments > kMostSegments) {
+    throw std::invalid_argument(fmt::format(
+        "the tile would have {:.3g} segments, at most {:.3g} are possible: make segment_um larger, repeats or "
+        "fibers_per_ply smaller",
+        forecast.segments, kMostSegments));
+  }
+  require_memory(static_cast<std::uint64_t>(forecast.bytes), fmt::format("fibers of {:.3g} segments", forecast.segments));
   const YarnPaths paths = lay_yarns(config);
   Exemplar exemplar;
   exemplar.width_mm = static_cast<float>(paths.width_mm);
   exemplar.height_mm = static_cast<float>(paths.height_mm);
   for (const FiberType& fiber : config.fibers) exemplar.scattering.push_back(fiber.scattering);
   exemplar.first_point.push_back(0);
+  exemplar.points.reserve(static_cast<std::size_t>(1.25 * forecast.segments));  // fibers have a point more than segments
   std::uint32_t yarn_index = 0;
   auto add_system = [&](const YarnConfig& yarn, const std::vector<YarnPath>& system) {
     for (const YarnPath& path : system) {
       add_fibers_of_yarn(yarn, config.fibers[static_cast<std::size_t>(yarn.fiber)].radius_mm, path, config.segment_mm,
                          config.seed, yarn_index++, exemplar);
+      yarn_done();
     }
   };
   add_system(config.warp, paths.warp);

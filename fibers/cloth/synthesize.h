@@ -2,13 +2,23 @@
 #define HEDDLE_FIBERS_CLOTH_SYNTHESIZE_H_
 // Weave, yarns, plies, fibers: the exemplar tile of a fabric. Tested in tests/fibers/cloth/synthesize_test.cpp.
 
+#include <functional>
+
 #include "fibers/cloth/exemplar.h"
 #include "fibers/cloth/fabric_config.h"
 
 namespace heddle {
 
-/// The same config gives the same bytes. Throws std::invalid_argument as lay_yarns().
-Exemplar synthesize(const FabricConfig& config);
+/// What synthesize() will make of a config, without making it.
+struct ExemplarForecast {
+  double segments = 0;
+  double bytes = 0;  // of memory, with what writing the fibers takes
+};
+ExemplarForecast forecast_exemplar(const FabricConfig& config);
+
+/// The same config gives the same bytes. `yarn_done` is called after each yarn. Throws std::invalid_argument as lay_yarns()
+/// and where indices of 32 bits do not suffice; MemoryError where the machine cannot hold the fibers.
+Exemplar synthesize(const FabricConfig& config, const std::function<void()>& yarn_done = [] {});
 
 /// What a user wants to know of an exemplar's geometry.
 struct ExemplarSummary {

@@ -1,6 +1,7 @@
 #include "fibers/tracing/tile_scene.h"
 
 #include <embree3/rtcore.h>
+#include <fmt/format.h>
 #include <tbb/task_arena.h>
 
 #include <atomic>
@@ -10,6 +11,7 @@
 
 #include "fibers/math/random.h"
 #include "fibers/math/sampling.h"
+#include "formats/memory_need.h"
 
 namespace heddle {
 namespace {
@@ -17,6 +19,9 @@ namespace {
 // A segment belongs to the tile's structure where its capsule reaches within this share of the tile's size of the tile,
 // and rays are followed as far beyond a tile's edge, so that rounding cannot lose a hit on the edge.
 constexpr float kEdgeMargin = 1e-4F;
+
+// Embree's own 53 and 50 more while it builds, and our copies of points and indices.
+constexpr std::uint64_t kBytesPerSegment = 150;
 
 struct QueryContext {
   RTCIntersectContext base;
@@ -48,6 +53,8 @@ struct TileScene::Impl {
 };
 
 TileScene::TileScene(Exemplar exemplar) : exemplar_(std::move(exemplar)), impl_(std::make_unique<Impl>()) {
+  require_memory(kBytesPerSegment * exemplar_.segment_count(),
+                 fmt::format("ray tracing of {} segments", exemplar_.segment_count()));
   impl_->device = rtcNewDevice(nullptr);
   assert(impl_->device != nullptr);
   rtcSetDeviceMemoryMonitorFunction(

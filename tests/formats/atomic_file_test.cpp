@@ -8,6 +8,7 @@
 #include <set>
 #include <span>
 
+#include "formats/memory_need.h"
 #include "tests/formats/file_fixture.h"
 
 namespace heddle {
@@ -198,6 +199,17 @@ TEST_F(AtomicFileTest, SystemErrorsAreNamed) {
   EXPECT_NE(error_of([&] { read_whole_file(folder_ / "absent"); }).find("absent: cannot open: No such file"),
             std::string::npos);
   EXPECT_NE(error_of([&] { read_whole_file(folder_); }).find("Is a directory"), std::string::npos);
+}
+
+TEST_F(AtomicFileTest, FilesThatTheMachineCannotHoldAreRefusedWithNumbers) {
+  const auto path = put("sparse", "");
+  std::filesystem::resize_file(path, std::uintmax_t{1} << 42);
+  try {
+    read_whole_file(path);
+    FAIL();
+  } catch (const MemoryError& error) {
+    EXPECT_EQ(std::string(error.what()).find(path.string() + ": needs 4398.0 GB of memory, "), 0U) << error.what();
+  }
 }
 
 TEST_F(AtomicFileTest, FilesWithoutASizeAreReadToTheirEnd) {

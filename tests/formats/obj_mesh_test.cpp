@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "tests/formats/file_fixture.h"
+#include "tests/support/mutations.h"
 
 namespace heddle {
 namespace {
@@ -132,6 +133,40 @@ TEST_F(ObjMeshFormat, EveryTruncationEndsInAMeshOrAnError) {
     } catch (const FileError&) {
     }
   }
+}
+
+TEST_F(ObjMeshFormat, CoordinatesBeyondAKilometreAreRefusedWithVertexAndLine) {
+  const std::string face = "v 0 0 0\nv 1 0 0\n# a comment\nv 0 1 %\nvt 0 0\nvt 1 0\nvt 0 @\nf 1/1 2/2 3/3\n";
+  const auto error = [&](const std::string& z, const std::string& v, const ObjUnits& units) {
+    std::string text = face;
+    text.replace(text.find('@'), 1, v).replace(text.find('%'), 1, z);
+    const auto path = put("m.obj", text);
+    const std::string message = error_of([&] { read_obj(path, units); });
+    return message == "no error" ? message : message.substr(path.parent_path().string().size() + 1);
+  };
+  EXPECT_EQ(error("1e6", "1", {1, 1}), "no error");
+  EXPECT_EQ(error("-1e6", "1", {1, 1}), "no error");
+  EXPECT_EQ(error("1.001e6", "1", {1, 1}),
+            "m.obj:4: vertex 3: a coordinate of 1.001e+06 mm; at most 1e+06 mm (1 km) either way");
+  EXPECT_EQ(error("-1e30", "1", {1000, 1}),
+            "m.obj:4: vertex 3: a coordinate of -1e+33 mm; at most 1e+06 mm (1 km) either way");
+  EXPECT_EQ(error("1", "-1e4", {1, 300}),
+            "m.obj:7: texture coordinate 3: a coordinate of -3e+06 mm; at most 1e+06 mm (1 km) either way");
+  EXPECT_EQ(error("1e30", "1e30", {}), "no error") << "of unknown unit";
+  EXPECT_EQ(error("1", "1e30", {.mm_per_unit = 1}), "no error") << "a black mesh has no use for UVs";
+}
+
+TEST_F(ObjMeshFormat, DamagedFilesEndInAMeshOrAnError) {
+  const std::string text = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\nf 1/1/1 2/1/1 3/1/1 4/1/1\nf -1 -2 -3\n";
+  for_each_mutation(text, 1, std::string_view("\0\n /-9e#\xff", 9), [&](const std::string& damaged) {
+    try {
+      const ObjMesh mesh = read(damaged);
+      for (const Triangle& triangle : mesh.triangles) {
+        for (const std::uint32_t vertex : triangle) EXPECT_LT(vertex, mesh.positions.size());
+      }
+    } catch (const FileError&) {
+    }
+  });
 }
 
 }  // namespace

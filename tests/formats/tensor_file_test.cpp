@@ -194,6 +194,21 @@ TEST_F(TensorFileFormat, HostileLengthsAreRefused) {
   EXPECT_NE(error(0, "").find("does not start with '{'"), std::string::npos);
 }
 
+TEST_F(TensorFileFormat, NamesAreAtMost10000AndReadFast) {
+  const auto header = [](int names) {
+    std::string text = "{\"__metadata__\":{}";
+    for (int k = 1; k < names; ++k) {
+      text += ",\"t" + std::to_string(k) + "\":{\"dtype\":\"U8\",\"shape\":[0],\"data_offsets\":[0,0]}";
+    }
+    return text + "}";
+  };
+  EXPECT_EQ(TensorFile::read(put_tensors(header(10'000), "")).entries().size(), 9'999u);
+  const std::string problem = "more than 10000 names in one object";
+  EXPECT_NE(error_of([&] { TensorFile::read(put_tensors(header(10'001), "")); }).find(problem), std::string::npos);
+  // Half a million: refused at the first too many.
+  EXPECT_NE(error_of([&] { TensorFile::read(put_tensors(header(500'000), "")); }).find(problem), std::string::npos);
+}
+
 TEST_F(TensorFileFormat, HostileHeadersAreRefusedWithTheirReason) {
   const auto entry = [](const std::string& dtype, const std::string& shape, const std::string& offsets) {
     return "{\"dtype\":" + dtype + ",\"shape\":" + shape + ",\"data_offsets\":" + offsets + "}";

@@ -287,6 +287,95 @@ TEST(TomlTableTest, SyntaxErrorsHaveTheirPlace) {
   EXPECT_NE(message_of([] { parse("a = 99999999999999999999\n"); }), "no error");
 }
 
+std::string repeated(const std::string& text, int count) {
+  std::string result;
+  for (int k = 0; k < count; ++k) result += text;
+  return result;
+}
+
+TEST(TomlTableTest, TablesAndArraysWithinEachOtherAreAtMost64) {
+  const auto place = [](const std::string& text) {
+    const std::string message = message_of([&] { parse(text).canonical_text(); });
+    return message.substr(0, message.find(": syntax: more than 64 tables and arrays within each other"));
+  };
+  // Each form at the limit, and one deeper: the place is that of the dot or bracket that goes too deep.
+  EXPECT_EQ(place("a" + repeated(".a", 64) + " = 1\n"), "no error");
+  EXPECT_EQ(place("a" + repeated(".a", 65) + " = 1\n"), "dir/f.toml:1:130");
+  EXPECT_EQ(place("[a" + repeated(".a", 63) + "]\n"), "no error");
+  EXPECT_EQ(place("\n[a" + repeated(" . a", 64) + "]\n"), "dir/f.toml:2:256");
+  EXPECT_EQ(place("[[a" + repeated(".a", 62) + "]]\n"), "no error");
+  EXPECT_EQ(place("[[a" + repeated(".a", 63) + "]]\n"), "dir/f.toml:1:128");
+  EXPECT_EQ(place("a = " + repeated("[", 64) + repeated("]", 64)), "no error");
+  EXPECT_EQ(place("a = " + repeated("[", 65) + repeated("]", 65)), "dir/f.toml:1:69");
+  EXPECT_EQ(place("a = " + repeated("{a=", 64) + "1" + repeated("}", 64)), "no error");
+  EXPECT_EQ(place("a = " + repeated("{a=", 65) + "1" + repeated("}", 65)), "dir/f.toml:1:197");
+  // Headers, keys, inline tables and arrays add up.
+  const std::string header = "[h" + repeated(".h", 29) + "]\n";
+  EXPECT_EQ(place(header + "k" + repeated(".k", 10) + " = [{x" + repeated(".x", 22) + " = 1}]\n"), "no error");
+  EXPECT_EQ(place(header + "k" + repeated(".k", 10) + " = [{x" + repeated(".x", 23) + " = 1}]\n"),
+            "dir/f.toml:2:72");
+  EXPECT_EQ(place(header + "k = 1\n[b]\nk" + repeated(".k", 63) + " = 1\n"), "no error");
+}
+
+TEST(TomlTableTest, DepthIsRefusedBeforeItIsBuilt) {
+  for (const int depth : {30'000, 100'000}) {
+    for (const std::string& text : {"a" + repeated(".a", depth) + " = 1", "[a" + repeated(".a", depth) + "]",
+                                    "[[a" + repeated(".a", depth) + "]]", "a = {a" + repeated(".a", depth) + " = 1}",
+                                    "a = " + repeated("[", depth), "a = " + repeated("{a.b = [", depth)}) {
+      const std::string message = message_of([&] { parse(text); });
+      EXPECT_NE(message.find("more than 64 tables and arrays within each other"), std::string::npos) << message;
+      EXPECT_LT(message.size(), 400u) << "an excerpt, not the whole line";
+    }
+  }
+}
+
+TEST(TomlTableTest, WhatOnlyLooksNestedIsNot) {
+  const std::string dots = repeated(".", 500);
+  const std::string brackets = repeated("[{", 500);
+  for (const std::string& text :
+       {"# " + dots + brackets + "\na = 1 # " + brackets, "a = \"" + dots + brackets + "\\\"" + brackets + "\"",
+        "a = '" + brackets + "\\'  # '" + brackets, "a = \"\"\"\n" + brackets + "\"\"\\\"\"\"" + brackets + "\"\"\"\"\"",
+        "a = \'\'\'\n" + brackets + "''\n\'\'\'\'\'", "\"" + dots + "\".'" + brackets + "' = 1",
+        "[\"" + dots + "\".'" + brackets + "']", "a = [" + repeated("1.5, ", 500) + "]",
+        "a = [\n" + repeated("{x.y = 1.5}, # [[\n", 500) + "]", std::string("a = {x.y = 1.5, x.z = 2.5}"),
+        repeated("[[a.b]]\nk.l = 07:32:00.999\n", 500), repeated("[[a.b]]\nk = [[1.5], [2.5]]\n", 500)}) {
+    EXPECT_EQ(message_of([&] { parse(text); }), "no error") << text.substr(0, 60);
+  }
+}
+
+TEST(TomlTableTest, LongLinesAreQuotedInPart) {
+  const std::string long_text = std::string("'").append(500, 'x').append("'");
+  EXPECT_EQ(message_of([&] { parse("k = " + long_text).number("k", {}); }),
+            "dir/f.toml:1:5: 'k': expected a number, found the string \"" + std::string(40, 'x') +
+                "...\"\n  k = '" + std::string(115, 'x') + "...\n      ^");
+  EXPECT_EQ(message_of([&] { parse("a = [" + long_text + ", " + long_text + ", 3]").numbers("a", {}, 0, 2); })
+                .substr(0, 16),
+            "dir/f.toml:1:5: ");
+  EXPECT_EQ(message_of([&] { parse("t = {a = " + long_text + ", b = 2, c = " + long_text + "}").table("t").string("b"); }),
+            "dir/f.toml:1:518: 'b': expected a string, found the integer 2\n  ..." + std::string(53, 'x') +
+                "', b = 2, c = '" + std::string(52, 'x') + "...\n     " + std::string(60, ' ') + "^");
+  // A long name in titles, and in the message about itself.
+  const std::string name(100'000, 'n');
+  std::string text = "[" + name + "]\n";
+  for (int k = 0; k < 10'000; ++k) text.append("k").append(std::to_string(k)).append(" = {}\n");
+  const std::string message = message_of([&] { parse(text).finish(); });
+  EXPECT_NE(message.find("unknown key '" + name.substr(0, 40) + "...'"), std::string::npos) << message.substr(0, 300);
+  EXPECT_LT(message.size(), 400u);
+}
+
+TEST(TomlTableTest, DocumentsAreAtMostOneMebibyte) {
+  const auto of_size = [](std::size_t size) { return std::string(size - 1, ' ') + "\n"; };
+  EXPECT_EQ(message_of([&] { parse(of_size(1 << 20)); }), "no error");
+  EXPECT_EQ(message_of([&] { parse(of_size((1 << 20) + 1)); }), "dir/f.toml: 1048577 bytes; a config has at most 1048576");
+  // The size alone is asked of a file, nothing is read: this one is sparse.
+  const auto path = std::filesystem::path(testing::TempDir()) / "toml_table_sparse.toml";
+  std::ofstream(path) << "";
+  std::filesystem::resize_file(path, std::uintmax_t{100} << 30);
+  EXPECT_EQ(message_of([&] { TomlTable::load(path); }),
+            path.string() + ": 107374182400 bytes; a config has at most 1048576");
+  std::filesystem::remove(path);
+}
+
 TEST(TomlTableTest, ControlCharactersDoNotReachTheTerminal) {
   const std::string message = message_of([] { parse("a = \"\\u001b[31m\"\n").number("a", {}); });
   EXPECT_EQ(message.find('\x1b'), std::string::npos) << message;

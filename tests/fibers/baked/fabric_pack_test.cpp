@@ -111,6 +111,16 @@ TEST_F(FabricPackFormat, MissingTruncatedAndFlippedFilesAreNamed) {
   EXPECT_NE(refusal().find("manifest.json"), std::string::npos);
 }
 
+TEST_F(FabricPackFormat, DeeplyNestedManifestsAreRefusedByName) {
+  for (const std::size_t depth : {65, 70'000, 250'000}) {
+    const std::string text = "{\"format\": \"heddle pack\", \"version\": 1, \"x\": " + std::string(depth, '[') +
+                             std::string(depth, ']') + ", \"manifest_xxh3_128\": \"x\"}";
+    write_file_atomically(folder_.path() / kManifestName, text);
+    EXPECT_NE(refusal().find("manifest.json: not a pack manifest: JSON nested deeper than 64"), std::string::npos)
+        << refusal();
+  }
+}
+
 TEST_F(FabricPackFormat, ManifestsThatAreNone) {
   for (const char* text :
        {"", "{", "[]", "null", "{}", "{\"format\": 3}", "{\"format\": \"heddle pack\", \"version\": 1}",

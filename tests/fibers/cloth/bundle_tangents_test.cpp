@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fibers/cloth/synthesize.h"
 #include "fibers/math/random.h"
 #include "fibers/math/sampling.h"
 #include "tests/support/fabrics.h"
@@ -83,6 +84,59 @@ TEST(BundleTangents, FibersThatCrossDoNotCount) {
   const std::vector<Vec3> with = bundle_tangents(exemplar);
   for (std::size_t s = 0; s < alone.size(); ++s) EXPECT_EQ(alone[s], with[s]);
   EXPECT_LT((with.back() - Vec3::UnitY()).norm(), 1e-6F);
+}
+
+/// The same by asking every pair of segments.
+std::vector<Vec3> bundle_tangents_of_all_pairs(const Exemplar& exemplar) {
+  std::vector<Vec3> mean;
+  for (std::uint32_t s = 0; s < exemplar.segment_count(); ++s) {
+    Vec3 sum = exemplar.segment_tangent(s);
+    for (std::uint32_t other = 0; other < exemplar.segment_count(); ++other) {
+      Vec3 apart = exemplar.segment_midpoint(other) - exemplar.segment_midpoint(s);
+      apart.x() -= exemplar.width_mm * std::round(apart.x() / exemplar.width_mm);
+      apart.y() -= exemplar.height_mm * std::round(apart.y() / exemplar.height_mm);
+      const float cosine = exemplar.segment_tangent(other).dot(exemplar.segment_tangent(s));
+      const bool counts = other != s && apart.norm() <= 4 * exemplar.radius_mm[exemplar.segment_fiber[s]];
+      if (counts && std::abs(cosine) >= 0.9F) sum += (cosine > 0 ? 1.0F : -1.0F) * exemplar.segment_tangent(other);
+    }
+    mean.push_back(sum.normalized());
+  }
+  return mean;
+}
+
+void expect_means_of_all_pairs(const Exemplar& exemplar) {
+  const std::vector<Vec3> mean = bundle_tangents(exemplar);
+  const std::vector<Vec3> expected = bundle_tangents_of_all_pairs(exemplar);
+  for (std::uint32_t s = 0; s < exemplar.segment_count(); ++s) ASSERT_LT((mean[s] - expected[s]).norm(), 1e-5F) << s;
+}
+
+TEST(BundleTangentsAgreement, ColumnsFindWhatAllPairsFind) {
+  expect_means_of_all_pairs(synthesize(test::small_fabric()));
+  Exemplar wandering = straight_bundle();
+  RandomStream random(3, RandomStage::kTest, 3, 0);
+  for (Vec3& point : wandering.points) point.tail<2>() += 0.002F * sample_disk(random);
+  index_segments(wandering);
+  expect_means_of_all_pairs(wandering);
+}
+
+// Few fibers on a tile of 1.3 m: 65,000 columns of 4 radii along each axis would be 4 billion.
+TEST(BundleTangentsAgreement, SparseYarnsOnALargeTile) {
+  FabricConfig config = test::small_fabric();
+  config.segment_mm = 10;
+  config.weave = parse_weave("plain", WeaveFace::kWarp);
+  config.repeats_x = config.repeats_y = 8;
+  config.fibers[0].radius_mm = 0.005;
+  for (YarnConfig* yarn : {&config.warp, &config.weft}) {
+    yarn->spacing_mm = 81.921;
+    yarn->width_mm = yarn->height_mm = 10;
+    yarn->plies = 1;
+    yarn->fibers_per_ply = 1;
+    yarn->yarn_turns_per_mm = yarn->ply_turns_per_mm = 0;
+  }
+  const Exemplar exemplar = synthesize(config);
+  ASSERT_GT(exemplar.width_mm, 1300);
+  ASSERT_GT(exemplar.width_mm / (4 * exemplar.radius_mm[0]), 65'000);
+  expect_means_of_all_pairs(exemplar);
 }
 
 }  // namespace

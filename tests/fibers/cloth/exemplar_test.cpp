@@ -5,9 +5,13 @@
 #include <filesystem>
 #include <functional>
 
+#include "fibers/cloth/bundle_tangents.h"
 #include "fibers/cloth/synthesize.h"
+#include "fibers/tracing/tile_scene.h"
 #include "formats/input_error.h"
 #include "tests/support/fabrics.h"
+#include "tests/support/mutations.h"
+#include "tests/support/small_exemplars.h"
 #include "tests/support/temporary_folder.h"
 
 namespace heddle {
@@ -30,7 +34,8 @@ TEST(ExemplarFormat, RoundTripKeepsEveryBit) {
 }
 
 TEST(ExemplarFormat, EachBrokenInvariantIsNamed) {
-  const Exemplar good = test::straight_fibers(1, 1, {{0.3F, 0}, {0.6F, 0.1F}}, 0.02F, 4, test::white_fiber());
+  Exemplar good = test::straight_fibers(1, 1, {{0.3F, 0}, {0.6F, 0.1F}}, 0.02F, 4, test::white_fiber());
+  good.scattering.push_back({Rgbd(0, 0.5, 1), Rgbd(0, 0.5, 1), radians(0.1), radians(60), radians(180)});
   EXPECT_NO_THROW(validate_exemplar(good, "good"));
   const std::vector<std::pair<int, std::function<void(Exemplar&)>>> breakages = {
       {1, [](Exemplar& e) { e.first_point[1] = 2; }},
@@ -39,10 +44,22 @@ TEST(ExemplarFormat, EachBrokenInvariantIsNamed) {
       {2, [](Exemplar& e) { e.points[3].z() = std::numeric_limits<float>::quiet_NaN(); }},
       {2, [](Exemplar& e) { e.radius_mm[1] = 0; }},
       {2, [](Exemplar& e) { e.radius_mm[0] = 0.6F; }},
+      {2, [](Exemplar& e) { e.radius_mm[1] = 1e-30F; }},
       {2, [](Exemplar& e) { e.width_mm = -1; }},
+      {2, [](Exemplar& e) { e.height_mm = 1e30F; }},
+      {2, [](Exemplar& e) { for (Vec3& p : e.points) p.x() += 2; }},
+      {2, [](Exemplar& e) { for (Vec3& p : e.points) p.y() -= 2; }},
+      {2, [](Exemplar& e) { e.points[2].x() = 1e30F; }},
+      {2, [](Exemplar& e) { e.points[2].y() = -4e9F; }},
+      {2, [](Exemplar& e) { e.points[2].z() = 1e4F; }},
       {3, [](Exemplar& e) { e.points[4].y() += 0.01F; }},
       {4, [](Exemplar& e) { e.points[2] = e.points[1]; }},
-      {5, [](Exemplar& e) { e.material[1] = 1; }},
+      {5, [](Exemplar& e) { e.material[1] = 2; }},
+      {5, [](Exemplar& e) { e.scattering.resize(65, e.scattering[0]); }},
+      {6, [](Exemplar& e) { e.scattering[1].color_tt[2] = 1.5; }},
+      {6, [](Exemplar& e) { e.scattering[1].beta_r = 0; }},
+      {6, [](Exemplar& e) { e.scattering[1].beta_tt = 1e300; }},
+      {6, [](Exemplar& e) { e.scattering[1].gamma_tt = -1; }},
   };
   for (const auto& [invariant, breakage] : breakages) {
     Exemplar bad = good;
@@ -56,6 +73,28 @@ TEST(ExemplarFormat, EachBrokenInvariantIsNamed) {
           << error.what();
     }
   }
+}
+
+TEST(ExemplarFormat, DamagedFilesEndInAnErrorOrInFibersThatRaysCanMeet) {
+  const TemporaryFolder folder;
+  const std::filesystem::path path = folder.path() / "fibers.safetensors";
+  write_exemplar(path, test::straight_fibers(1, 1, {{0.3F, 0}, {0.6F, 0.1F}}, 0.02F, 4, test_cotton()), {});
+  int refused = 0;
+  int read = 0;
+  for_each_mutation(bytes_of(path), 3, std::string_view("\0\x7f\xff", 3), [&](const std::string& damaged) {
+    write_bytes(path, damaged);
+    try {
+      const Exemplar exemplar = read_exemplar(path);
+      if (++read % 8 != 0) return;
+      EXPECT_EQ(bundle_tangents(exemplar).size(), exemplar.segment_count());
+      const TileScene scene(exemplar);
+      EXPECT_LT(scene.memory_bytes(), 100'000U);
+    } catch (const FileError&) {
+      ++refused;
+    }
+  });
+  EXPECT_GT(refused, 500);
+  EXPECT_GT(read, 50);
 }
 
 }  // namespace

@@ -25,6 +25,10 @@ TEST(FabricConfig, ReadsUnitsIntoMillimetresAndRadians) {
 
 TEST(FabricConfig, EachClassOfErrorNamesPlaceAndExpectation) {
   const std::string good = test::small_fabric_toml();
+  std::string many_fibers;
+  for (int k = 0; k < 64; ++k) {
+    many_fibers += "[fiber.f" + std::to_string(k) + "]\nradius_um = 14\nscattering = \"white-isotropic\"\n";
+  }
   const std::vector<std::array<std::string, 3>> cases = {
       // changed text, replacement, what the message must hold
       {"radius_um = 14", "radius_mm = 0.014", "radius_um"},
@@ -41,6 +45,7 @@ TEST(FabricConfig, EachClassOfErrorNamesPlaceAndExpectation) {
       {"color_r = [0.3, 0.2, 0.1]", "color_r = [0.3, 0.2]", "color_r"},
       {"color_r = [0.3, 0.2, 0.1]", "color_r = [0.3, 0.2, 1.1]", "1"},
       {"plies = 2", "plies = 2.5", "integer"},
+      {"[fiber.thread]", many_fibers + "[fiber.thread]", "1 to 64 tables [fiber.NAME]"},
       {"light_from = \"face\"", "light_from = \"above\"", "both"},
   };
   for (const auto& [from, to, expected] : cases) {
@@ -55,6 +60,24 @@ TEST(FabricConfig, EachClassOfErrorNamesPlaceAndExpectation) {
       EXPECT_NE(message.find(expected), std::string::npos) << to << "\n" << message;
     }
   }
+}
+
+TEST(FabricConfig, TilesAreAtMostTenMetres) {
+  const auto message = [](const std::string& key, const std::string& yarn) {
+    std::string text = with(test::small_fabric_toml(), key + " = 1", key + " = 64");
+    const std::size_t at = text.find("spacing_mm = 0.3", text.find(yarn));
+    text.replace(at, 16, "spacing_mm = 78.2");
+    try {
+      read_fabric_config(TomlTable::parse(text, "fabric.toml"));
+    } catch (const ConfigError& error) {
+      return std::string(error.what()).substr(0, 110);
+    }
+    return std::string();
+  };
+  EXPECT_EQ(message("repeats_x", "[warp]").find("fabric.toml:7:1: 'repeats_x': expected a tile of at most 10000 mm, found 10009.6 mm"), 0U)
+      << message("repeats_x", "[warp]");
+  EXPECT_EQ(message("repeats_y", "[weft]").find("fabric.toml:8:1: 'repeats_y': expected a tile of at most 10000 mm, found 10009.6 mm"), 0U);
+  EXPECT_EQ(message("repeats_y", "[warp]"), "");
 }
 
 }  // namespace

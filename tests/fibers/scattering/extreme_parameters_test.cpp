@@ -60,7 +60,6 @@ TEST(ExtremeParametersStability, NoMoreLightOutThanIn) {
         const double width = std::hypot(fiber.beta_r, 1 / std::sqrt(sharpness + 1));
         std::vector<double> breaks;
         append_geometric_breaks(-theta, width, kPi / 2, breaks);
-        append_geometric_breaks(-theta, -width, -kPi / 2, breaks);
         const QuadratureRule inclinations = gauss_legendre_panels(12, -kPi / 2, kPi / 2, breaks);
         std::vector<double> turns;
         append_geometric_breaks(0, std::hypot(fiber.gamma_tt, 1 / std::sqrt(sharpness + 1)), kPi, turns);

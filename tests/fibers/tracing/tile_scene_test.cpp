@@ -63,9 +63,9 @@ TEST(TileSceneAgreement, EyeRaysAgreeWithBruteForceOverCopies) {
     RandomStream random(1, RandomStage::kTest, 1, static_cast<std::uint64_t>(i));
     const Vec3 origin(3 * random.uniform() - 1, 3 * random.uniform() - 1, 0.5F);
     const Vec3 direction = sample_hemisphere(Vec3(0, 0, -1), random);
-    if (direction.z() > -0.3F) continue;  // stays within the copies of the brute force
+    if (direction.z() > -0.3F) continue;  // at most 1.9 mm aside: within the copies of the brute force
     const Ray ray{origin, 2.5F * direction};
-    const double expected = first_hit_by_hand(e, ray, kNoFiber, 4);
+    const double expected = first_hit_by_hand(e, ray, kNoFiber, 7);
     const auto hit = scene.intersect(ray, kNoFiber);
     ASSERT_EQ(hit.has_value(), expected >= 0) << i;
     EXPECT_EQ(scene.occluded(ray, kNoFiber), hit.has_value());
