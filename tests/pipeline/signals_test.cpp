@@ -173,6 +173,9 @@ TEST(SignalsEndToEnd, EveryCommandEndsWithinASecondAndSaysWhatIsKept) {
     }
   }
   for (const char* name : {"exact.exr", "path.exr"}) EXPECT_FALSE(fs::exists(shop / name)) << name;
+  for (const auto& entry : fs::recursive_directory_iterator(shop / "")) {
+    EXPECT_NE(entry.path().extension(), ".tmp") << entry.path() << " was left behind";
+  }
 }
 
 TEST(SignalsEndToEnd, ASecondSignalEndsAtOnce) {
