@@ -23,6 +23,7 @@
 #include <cerrno>
 #include <fstream>
 #include <span>
+#include <system_error>
 #include <utility>
 
 #include "formats/atomic_file.h"
