@@ -63,6 +63,7 @@ const std::string& machine() {
 /// This process's temporary names, and the folders in which it has looked for those of dead processes.
 struct Registry {
   std::mutex mutex;
+  bool ended = false;  // temporaries are being removed: what is left of them must not be renamed into place
   std::set<fs::path> names;
   std::set<fs::path> searched;
 };
@@ -116,6 +117,13 @@ fs::path resolved(fs::path target) {
   }
 }
 
+/// 0, or the system's reason.
+int rename_unless_ended(const fs::path& from, const fs::path& to, unsigned flags = 0) {
+  const std::lock_guard lock(registry().mutex);
+  if (registry().ended) return EINTR;
+  return ::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), flags) == 0 ? 0 : errno;
+}
+
 /// Makes renames inside a folder durable, where its file system can.
 void flush_folder(const fs::path& folder) {
   const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
@@ -158,23 +166,20 @@ TemporaryPath::~TemporaryPath() {
 
 void TemporaryPath::commit() {
   std::error_code error;
-  if (fs::is_directory(path_, error)) flush_folder(path_);
-  if (fs::is_directory(path_, error) && fs::is_directory(target_, error)) {
+  const bool is_folder = fs::is_directory(path_, error);
+  if (is_folder) flush_folder(path_);
+  if (is_folder && fs::is_directory(target_, error)) {
     // The old folder takes the temporary name, under which it is removed.
-    if (::renameat2(AT_FDCWD, path_.c_str(), AT_FDCWD, target_.c_str(), RENAME_EXCHANGE) != 0) {
-      const bool cannot_exchange = errno == EINVAL || errno == ENOSYS;
-      if (!cannot_exchange) fail_at(target_, "cannot replace", errno);
-      TemporaryPath aside(target_);
-      if (::rename(target_.c_str(), aside.path_.c_str()) != 0) fail_at(target_, "cannot replace", errno);
-      if (::rename(path_.c_str(), target_.c_str()) != 0) {
-        const int reason = errno;
-        ::rename(aside.path_.c_str(), target_.c_str());
-        fail_at(target_, "cannot replace", reason);
-      }
+    int reason = rename_unless_ended(path_, target_, RENAME_EXCHANGE);
+    if (reason == EINVAL || reason == ENOSYS) {  // a file system that cannot exchange
+      const TemporaryPath aside(target_);
+      reason = rename_unless_ended(target_, aside.path_);
+      if (reason == 0 && (reason = rename_unless_ended(path_, target_)) != 0) rename_unless_ended(aside.path_, target_);
     }
+    if (reason != 0) fail_at(target_, "cannot replace", reason);
     fs::remove_all(path_, error);
-  } else if (::rename(path_.c_str(), target_.c_str()) != 0) {
-    fail_at(target_, "cannot replace", errno);
+  } else if (const int reason = rename_unless_ended(path_, target_); reason != 0) {
+    fail_at(target_, "cannot replace", reason);
   }
   committed_ = true;
   flush_folder(folder_of(target_));
@@ -262,6 +267,7 @@ void write_file_atomically(const fs::path& path, std::string_view text) {
 void remove_own_temporaries() noexcept {
   std::error_code ignored;
   const std::lock_guard lock(registry().mutex);
+  registry().ended = true;
   for (const fs::path& name : registry().names) fs::remove_all(name, ignored);
 }
 

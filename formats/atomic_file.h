@@ -77,7 +77,8 @@ void require_writable(const std::filesystem::path& target);
 void write_file_atomically(const std::filesystem::path& path, std::span<const std::byte> bytes);
 void write_file_atomically(const std::filesystem::path& path, std::string_view text);
 
-/// Removes what lies under this process's temporary names: for a process that ends without running destructors.
+/// Removes what lies under this process's temporary names, and lets nothing be committed any more: for a process that ends
+/// without running destructors.
 void remove_own_temporaries() noexcept;
 
 /// The whole file as bytes. Errors: FileError with the system's reason; MemoryError where the machine has no room for it.

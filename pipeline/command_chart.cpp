@@ -215,6 +215,8 @@ class ChartMaker {
       for (const ReferenceKind kind : kReferenceKinds) compare(kind, colors, row);
     } catch (const Interrupted&) {
       throw;
+    } catch (const std::bad_alloc&) {
+      row.message = "memory ran out";
     } catch (const std::exception& error) {
       row.message = error.what();
     }

@@ -35,11 +35,8 @@ void provide_picture(SceneJob& scene, const PictureRequest& request, const fs::p
     result.built = true;
     result.seconds = watch.elapsed().seconds;
   } else {
-    const std::vector<std::byte> bytes = read_whole_file(fs::path(cached).replace_extension(".json"));
-    const auto* text = reinterpret_cast<const char*>(bytes.data());
-    const auto report = nlohmann::ordered_json::parse(text, text + bytes.size());
-    if (report.contains("warnings")) {
-      for (const Warning& warning : warnings_of(report.at("warnings"))) context.console->warn(warning_text(warning));
+    for (const Warning& warning : read_warnings(fs::path(cached).replace_extension(".json"))) {
+      context.console->warn(warning_text(warning));
     }
   }
   for (const char* extension : {".exr", ".png", ".json"}) {

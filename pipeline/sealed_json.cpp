@@ -1,12 +1,9 @@
 #include "pipeline/sealed_json.h"
 
-#include <string_view>
-#include <vector>
-
 #include "formats/atomic_file.h"
 #include "formats/content_hash.h"
 #include "formats/input_error.h"
-#include "formats/json_text.h"
+#include "pipeline/json_file.h"
 
 namespace heddle {
 namespace {
@@ -23,9 +20,7 @@ void write_sealed_json(const std::filesystem::path& path, Json document) {
 }
 
 Json read_sealed_json(const std::filesystem::path& path) {
-  const std::vector<std::byte> bytes = read_whole_file(path);
-  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  Json document = is_nested_too_deeply(text) ? Json() : Json::parse(text, nullptr, false);
+  Json document = read_json(path);
   if (document.is_object() && document.contains(kSeal)) {
     const Json seal = document.at(kSeal);
     document.erase(kSeal);

@@ -107,7 +107,7 @@ std::shared_ptr<const DistanceMaps> SurfaceStages::maps(const Surface& surface, 
         };
         bake_distance_maps(scene, cloth, side, vertex_done).write(path, stage.metadata);
       });
-  return std::make_shared<const DistanceMaps>(DistanceMaps::read(artifact.path));
+  return std::make_shared<const DistanceMaps>(DistanceMaps::read(artifact.path, cloth.vertex_count()));
 }
 
 std::vector<std::shared_ptr<const InteractiveSurface>> SurfaceStages::load(const ClothScene& scene) const {
@@ -120,14 +120,15 @@ std::vector<std::shared_ptr<const InteractiveSurface>> SurfaceStages::load(const
     const MicrocylinderFabric& fabric = *surface->fabric->interactive;
     auto& model = models[surface->fabric->text];
     if (!model) {
+      const InteractiveSettings settings;
+      const std::vector<TangentSample> tangents = tangent_samples(fabric, settings.most_tangents);
       const Artifact table =
           provide_artifact(surface->weights, surface->fabric->name, *context_, [&](const fs::path& path, StageResult&) {
-            const InteractiveSettings settings;
-            WeightingTable(fabric, tangent_samples(fabric, settings.most_tangents), settings.weighting, settings.table)
+            WeightingTable(fabric, tangents, settings.weighting, settings.table)
                 .write(path, surface->weights.metadata);
           });
-      model = std::make_shared<const InteractiveMicrocylinder>(fabric, InteractiveSettings{},
-                                                               WeightingTable::read(table.path));
+      model = std::make_shared<const InteractiveMicrocylinder>(fabric, settings,
+                                                               WeightingTable::read(table.path, tangents.size()));
     }
     loaded.back() = std::make_shared<const InteractiveSurface>(model, maps(*surface, ClothSide::kFace, scene, cloth),
                                                                maps(*surface, ClothSide::kBack, scene, cloth));

@@ -10,6 +10,8 @@
 #include <optional>
 
 #include "fibers/math/random.h"
+#include "formats/input_error.h"
+#include "pipeline/json_file.h"
 
 namespace heddle {
 namespace {
@@ -209,13 +211,23 @@ nlohmann::ordered_json warnings_report(std::span<const Warning> warnings) {
   return report;
 }
 
-std::vector<Warning> warnings_of(const nlohmann::ordered_json& report) {
+std::vector<Warning> warnings_of(const nlohmann::json& report) {
   std::vector<Warning> warnings;
   for (const auto& entry : report) {
     warnings.push_back({entry.at("subject").get<std::string>(), entry.at("what").get<std::string>(),
                         entry.at("expected_relative_error").get<double>(), entry.at("instead").get<std::string>()});
   }
   return warnings;
+}
+
+std::vector<Warning> read_warnings(const std::filesystem::path& path) {
+  const nlohmann::json report = read_json(path);
+  try {
+    if (report.is_object() && !report.contains("warnings")) return {};
+    return warnings_of(report.at("warnings"));
+  } catch (const nlohmann::json::exception& error) {
+    throw FileError(fmt::format("{}: no picture's report: {}", path.string(), error.what()));
+  }
 }
 
 PackFacts pack_facts(const FabricPack& pack, const TileScene& tile) {

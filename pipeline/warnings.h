@@ -6,6 +6,7 @@
 // the picture, and put it into the picture's report. A warning never changes a result or an exit status.
 // Tested in tests/pipeline/warnings_test.cpp.
 
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <span>
 #include <string>
@@ -33,7 +34,9 @@ struct Warning {
 std::string warning_text(const Warning& warning);
 /// [{"subject", "what", "expected_relative_error", "instead"}], and back.
 nlohmann::ordered_json warnings_report(std::span<const Warning> warnings);
-std::vector<Warning> warnings_of(const nlohmann::ordered_json& report);
+std::vector<Warning> warnings_of(const nlohmann::json& report);
+/// The warnings in the report beside a picture. Errors: FileError.
+std::vector<Warning> read_warnings(const std::filesystem::path& path);
 
 // Transfer: cells of more mean free paths are visibly too dark and blocky.
 inline constexpr double kCellMeanFreePaths = 6;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <istream>
+#include <limits>
 #include <ostream>
 #include <set>
 #include <string>
@@ -10,6 +11,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "formats/json_text.h"
 #include "pipeline/eval/eval_quantities.h"
 
 namespace heddle {
@@ -52,6 +54,9 @@ struct Field {
   std::string name;
   std::string text;  // the value as it was written
 };
+
+// Characters of a request. Most take a few hundred; a map of `visibility` with 256 x 256 cells takes 66,000.
+constexpr std::size_t kLongestLine = std::size_t{256} << 10;
 
 bool is_space(char c) {
   return c == ' ' || c == '\t' || c == '\r' || c == '\n';
@@ -209,6 +214,12 @@ struct Answer {
 Answer answer_line(const std::string& line) {
   std::string id;  // as it was written; empty: none
   try {
+    if (line.size() > kLongestLine) {
+      throw UnreadableLine("longer than " + std::to_string(kLongestLine) + " characters");
+    }
+    if (is_nested_too_deeply(line)) {
+      throw UnreadableLine("nested deeper than " + std::to_string(kMaxJsonDepth));
+    }
     const std::vector<Field> fields = FieldScanner(line).scan();
     // The id first, so that errors in other fields carry it.
     std::string duplicate;
@@ -247,17 +258,32 @@ Answer answer_line(const std::string& line) {
   }
 }
 
+// The next line; of one that is too long, only what shows that it is. False at the end of the stream.
+bool read_line(std::istream& in, std::string& line) {
+  constexpr int kEnd = std::char_traits<char>::eof();
+  line.clear();
+  while (line.size() <= kLongestLine) {
+    const int c = in.rdbuf()->sbumpc();
+    if (c == '\n') return true;
+    if (c == kEnd) return !line.empty();
+    line += static_cast<char>(c);
+  }
+  return true;
+}
+
 }  // namespace
 
 int run_eval(std::istream& in, std::ostream& out) {
   int status = 0;
   std::string line;
-  while (std::getline(in, line)) {
-    if (std::all_of(line.begin(), line.end(), is_space)) continue;
+  while (read_line(in, line)) {
+    const bool is_cut = line.size() > kLongestLine;
+    if (!is_cut && std::all_of(line.begin(), line.end(), is_space)) continue;
     const Answer answer = answer_line(line);
     if (!answer.has_value) status = 1;
     out << answer.text << '\n' << std::flush;
     if (!out) return 1;
+    if (is_cut) in.ignore(std::numeric_limits<std::streamsize>::max(), '\n');
   }
   return status;
 }

@@ -13,7 +13,10 @@
 namespace heddle {
 namespace {
 
-constexpr std::size_t kMaxResolution = 1024;
+// What one request may cost: about a second, and 70 MB.
+constexpr std::size_t kMaxResolution = 256;
+constexpr std::size_t kMaxCellsTimesGaussians = std::size_t{1} << 24;
+constexpr std::size_t kMaxCellsTimesDirections = std::size_t{1} << 22;
 
 // A Gaussian this sharp is 1e-6 wide: beyond, the integral over the map only changes nearer than that to an edge.
 constexpr double kSharpest = 1e12;
@@ -36,9 +39,17 @@ SphericalMap read_map(EvalObject& request) {
   return map;
 }
 
-std::vector<Vec3d> read_directions(EvalObject& request) {
+std::size_t cell_count(const SphericalMap& map) {
+  return static_cast<std::size_t>(map.resolution()) * static_cast<std::size_t>(map.resolution());
+}
+
+std::vector<Vec3d> read_directions(EvalObject& request, const SphericalMap& map) {
   const nlohmann::json& list = request.value("directions");
   if (!list.is_array()) request.fail("directions", "expected a list of directions");
+  const std::size_t most = kMaxCellsTimesDirections / cell_count(map);
+  if (list.size() > most) {
+    request.fail("directions", "expected at most " + std::to_string(most) + " with a map of this size");
+  }
   std::vector<Vec3d> directions;
   for (const nlohmann::json& item : list) {
     const std::string name = "directions[" + std::to_string(directions.size()) + "]";
@@ -70,7 +81,10 @@ SgSumShape read_shape(EvalObject& request, const SphericalMap& map) {
                  : axes == "sphere" ? FibonacciSet::kSphere
                                     : FibonacciSet::kHemisphere;
   }
-  if (request.has("count")) shape.count = request.integer("count", 1, 1024);
+  if (request.has("count")) {
+    const std::size_t most = std::min<std::size_t>(1024, kMaxCellsTimesGaussians / cell_count(map));
+    shape.count = request.integer("count", 1, static_cast<int>(most));
+  }
   shape.sharpness =
       request.has("sharpness_svf") ? request.sharpness("sharpness_svf") : default_sg_sharpness(shape.axes);
   if (request.choice("weights", {"voronoi", "nnls"}, "nnls") == "voronoi") shape.weights = SgWeights::kVoronoi;
@@ -128,7 +142,7 @@ double map_integral(const SphericalMap& map, const SphericalGaussian& gaussian) 
 
 nlohmann::json eval_visibility(EvalObject& request) {
   const SphericalMap map = read_map(request);
-  const std::vector<Vec3d> directions = read_directions(request);
+  const std::vector<Vec3d> directions = read_directions(request, map);
   const SgSumShape shape = read_shape(request, map);
   const bool has_light = request.has("sharpness");
   const double light_sharpness = has_light ? request.sharpness("sharpness") : 0;

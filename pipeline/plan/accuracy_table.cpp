@@ -7,6 +7,7 @@
 
 #include "formats/atomic_file.h"
 #include "formats/input_error.h"
+#include "pipeline/json_file.h"
 
 namespace heddle {
 namespace {
@@ -60,9 +61,9 @@ Json entries_json(const std::vector<Accuracy>& entries) {
   return json;
 }
 
-std::vector<Accuracy> entries_of(const Json& json) {
+std::vector<Accuracy> entries_of(const nlohmann::json& json) {
   std::vector<Accuracy> entries;
-  for (const Json& values : json) {
+  for (const nlohmann::json& values : json) {
     const auto ratio = values.at("color_ratio").get<std::array<double, 3>>();
     entries.push_back({values.at("bias_square").get<double>(), values.at("bias_square_error").get<double>(),
                        values.at("noise_square").get<double>(), values.at("change_square").get<double>(),
@@ -151,16 +152,15 @@ void write_accuracy(const std::filesystem::path& path, const AccuracyTable& tabl
 }
 
 AccuracyTable read_accuracy(const std::filesystem::path& path) {
-  const std::vector<std::byte> bytes = read_whole_file(path);
-  const auto* text = reinterpret_cast<const char*>(bytes.data());
+  const nlohmann::json json = read_json(path);
   try {
-    const Json json = Json::parse(text, text + bytes.size());
     if (json.at("format") != "heddle accuracy" || json.at("version") != kFormatVersion) {
       throw FileError(path.string() + ": not an accuracy table of this version");
     }
     AccuracyTable table;
     table.fabric = json.at("fabric").get<std::string>();
     table.key = json.at("key").get<std::string>();
+    if (!json.at("threads").is_number_integer()) throw FileError(path.string() + ": threads is no integer");
     table.threads = json.at("threads").get<int>();
     table.sharpness = json.at("sharpness").get<std::vector<double>>();
     table.footprint_mm = json.at("footprint_mm").get<std::vector<double>>();
@@ -184,7 +184,7 @@ AccuracyTable read_accuracy(const std::filesystem::path& path) {
     if (!table.bent_between.empty() && table.bent_between.size() != table.sharpness.size()) {
       throw FileError(path.string() + ": light from fold to fold is not given for every sharpness");
     }
-    for (const Json& entry : json.at("settings")) {
+    for (const nlohmann::json& entry : json.at("settings")) {
       SettingAccuracy setting;
       setting.name = entry.at("name").get<std::string>();
       setting.seconds_per_sample = entry.at("seconds_per_sample").get<double>();

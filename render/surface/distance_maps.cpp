@@ -117,7 +117,7 @@ void DistanceMaps::write(const std::filesystem::path& path, const std::map<std::
   file.write(path);
 }
 
-DistanceMaps DistanceMaps::read(const std::filesystem::path& path) {
+DistanceMaps DistanceMaps::read(const std::filesystem::path& path, std::size_t vertices) {
   const TensorFile file = TensorFile::read(path);
   const std::vector<std::uint64_t> shape = file.shape("basis");
   if (shape.size() != 3 || shape[0] != shape[1] || shape[0] < 4 || shape[0] > 4096 || shape[2] == 0 ||
@@ -128,7 +128,7 @@ DistanceMaps DistanceMaps::read(const std::filesystem::path& path) {
   maps.resolution_ = static_cast<int>(shape[0]);
   maps.stride_ = shape[2];
   maps.basis_ = file.get<float>("basis", shape);
-  maps.coefficients_ = file.get<float>("coefficients", {0, shape[2]});
+  maps.coefficients_ = file.get<float>("coefficients", {vertices, shape[2]});
   maps.compression_error_ = file.get<double>("compression_error", {1})[0];
   return maps;
 }

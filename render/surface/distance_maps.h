@@ -49,8 +49,8 @@ class DistanceMaps {
                const std::function<void()>& vertex_done = {});
 
   void write(const std::filesystem::path& path, const std::map<std::string, std::string>& metadata) const;
-  /// Errors: FileError.
-  static DistanceMaps read(const std::filesystem::path& path);
+  /// Maps of so many vertices. Errors: FileError, also where there are others.
+  static DistanceMaps read(const std::filesystem::path& path, std::size_t vertices);
 
   std::size_t vertex_count() const { return coefficients_.size() / stride_; }
   /// Coefficients of a vertex, [stride()]. Those of a point between vertices are their linear interpolation.

@@ -359,7 +359,7 @@ void WeightingTable::write(const std::filesystem::path& path,
   file.write(path);
 }
 
-WeightingTable WeightingTable::read(const std::filesystem::path& path) {
+WeightingTable WeightingTable::read(const std::filesystem::path& path, std::size_t tangents) {
   const TensorFile file = TensorFile::read(path);
   const std::vector<std::int32_t> grid = file.get<std::int32_t>("grid", {3});
   const std::vector<std::int32_t> ranks = file.get<std::int32_t>("ranks", {0});
@@ -368,7 +368,7 @@ WeightingTable WeightingTable::read(const std::filesystem::path& path) {
   const auto within = [](std::int32_t value, std::int32_t low, std::int32_t high) {
     return low <= value && value <= high;
   };
-  bool fits = within(grid[0], 2, 4096) && within(grid[1], 2, 4096) && within(grid[2], 4, 4096) && !ranks.empty();
+  bool fits = within(grid[0], 2, 4096) && within(grid[1], 2, 4096) && within(grid[2], 4, 4096) && ranks.size() == tangents;
   std::size_t whole = 0;
   for (const std::int32_t rank : ranks) {
     fits = fits && within(rank, 1, 1 << 24);

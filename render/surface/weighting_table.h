@@ -77,8 +77,8 @@ class WeightingTable {
   const std::vector<int>& ranks() const { return ranks_; }
 
   void write(const std::filesystem::path& path, const std::map<std::string, std::string>& metadata) const;
-  /// Errors: FileError.
-  static WeightingTable read(const std::filesystem::path& path);
+  /// A table of so many tangents. Errors: FileError, also where there are others.
+  static WeightingTable read(const std::filesystem::path& path, std::size_t tangents);
 
  private:
   WeightingTable() = default;

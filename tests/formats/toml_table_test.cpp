@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include "formats/input_error.h"
+#include "tests/support/mutations.h"
 
 namespace heddle {
 namespace {
@@ -449,6 +450,22 @@ TEST(TomlTableTest, CanonicalTextDependsOnContentOnly) {
   }
   EXPECT_NE(parse("d = 1979-05-27\n").canonical_text(), parse("d = 1979-05-28\n").canonical_text());
   EXPECT_EQ(parse("a = 1\n[t]\nk = 2\n").table("t").canonical_text(), R"({"k":2})");
+}
+
+TEST(TomlTableTest, DamagedDocumentsEndInValuesOrAnErrorWithItsPlace) {
+  const std::string whole = std::string(kFabric) + "t = {a.b = \"\"\"x\"\"\", c = [[1.5], ['y']]} # end\n";
+  int damaged = 0;
+  for_each_mutation(whole, 1, std::string_view("\0\n\"'[]{}.,=#\\\xff", 14), [&](const std::string& text) {
+    const std::string message = message_of([&] {
+      const TomlTable t = parse(text);
+      EXPECT_FALSE(t.canonical_text().empty());
+      t.finish();
+    });
+    const bool holds_nothing = text.find_first_not_of("# abcfir\n") == std::string::npos;
+    EXPECT_EQ(message.substr(0, 11), holds_nothing ? "no error" : "dir/f.toml:") << text;
+    ++damaged;
+  });
+  EXPECT_GT(damaged, 2000);
 }
 
 }  // namespace

@@ -1,7 +1,9 @@
 #include "pipeline/eval/eval.h"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -10,6 +12,7 @@
 
 #include "fibers/math/spherical_harmonics.h"
 #include "fibers/scattering/sg_scatter.h"
+#include "tests/support/mutations.h"
 
 namespace heddle {
 namespace {
@@ -126,6 +129,62 @@ TEST(EvalFormat, EveryTruncationOfALineIsAnAnsweredError) {
     const Json json = answer(line.substr(0, length));
     EXPECT_TRUE(json.contains("error") && json["id"].is_null()) << length;
   }
+}
+
+TEST(EvalFormat, LinesTooLongOrTooDeepAreAnsweredAndTheStreamGoesOn) {
+  const std::string good = R"({"quantity":"sg_mass","sharpness":0})";
+  const auto brackets = [](std::size_t depth) { return std::string(depth, '[') + std::string(depth, ']'); };
+  const std::string start = R"({"quantity":"sg_mass","sharpness":0,"id":")";
+  const std::string longest = start + std::string((256 << 10) - start.size() - 2, 'x') + "\"}";
+  EXPECT_EQ(run(longest).status, 0) << "262,144 characters";
+  EXPECT_EQ(run(start.substr(0, start.size() - 1) + brackets(63) + "}").status, 0);
+  const std::pair<std::string, std::string> bad[] = {
+      {longest + " ", "longer than 262144 characters"},
+      {std::string(longest.size() + 1, ' '), "longer than 262144 characters"},
+      {std::string(3 << 20, '['), "longer than 262144 characters"},
+      {start.substr(0, start.size() - 1) + brackets(64) + "}", "nested deeper than 64"},
+      {R"({"quantity":"microcylinder","wi":[0,0,1],"wo":[0,0,1],"fabric":{"a":)" + brackets(130'000) + "}}",
+       "nested deeper than 64"},
+      {R"({"quantity":)" + brackets(130'000) + "}", "nested deeper than 64"}};
+  for (const auto& [line, error] : bad) {
+    const Outcome result = run(line + "\n" + good + "\n");
+    EXPECT_EQ(result.status, 1);
+    ASSERT_EQ(result.lines.size(), 2U) << error;
+    EXPECT_EQ(result.lines[0], "{\"id\":null,\"error\":\"" + error + "\"}");
+    EXPECT_EQ(result.lines[1], "{\"value\":12.566370614359172}");
+  }
+  EXPECT_EQ(run(std::string(3 << 20, '{')).lines.size(), 1U) << "no end of line";
+}
+
+// A stream of the same character.
+class EndlessBuffer : public std::streambuf {
+ public:
+  explicit EndlessBuffer(std::size_t blocks) : block_(1 << 20, 'x'), blocks_(blocks) {}
+
+ protected:
+  int_type underflow() override {
+    if (blocks_ == 0) return traits_type::eof();
+    --blocks_;
+    setg(block_.data(), block_.data(), block_.data() + block_.size());
+    return traits_type::to_int_type(block_[0]);
+  }
+
+ private:
+  std::string block_;
+  std::size_t blocks_;
+};
+
+TEST(EvalFormat, AnEndlessLineTakesNoMemory) {
+  EndlessBuffer buffer(256);
+  std::istream in(&buffer);
+  std::ostringstream out;
+  rusage before{};
+  getrusage(RUSAGE_SELF, &before);
+  EXPECT_EQ(run_eval(in, out), 1);
+  rusage after{};
+  getrusage(RUSAGE_SELF, &after);
+  EXPECT_LT(after.ru_maxrss, before.ru_maxrss + 20'000) << "kilobytes, of a line of 256 MiB";
+  EXPECT_EQ(out.str(), "{\"id\":null,\"error\":\"longer than 262144 characters\"}\n");
 }
 
 // A stream that counts how often it is flushed.
@@ -274,6 +333,20 @@ TEST(EvalStability, ValuesAreFiniteAtTheEndsOfTheRanges) {
       EXPECT_EQ(run(std::string(R"({"quantity":"sg_mass","sharpness":)") + sharpness + "}").status, 0);
     }
   }
+}
+
+TEST(EvalFormat, EveryDamagedLineHasOneAnswerPerLine) {
+  const std::string line = R"({"id":[7,{"a":"b\n"}],"quantity":"sh","order":1,"direction":[0,0.6,-0.8]})";
+  for_each_mutation(line, 1, std::string_view("\0\"\\[]{},:e-9 \xff", 14), [&](const std::string& damaged) {
+    if (damaged.find_first_not_of(" \t\r\n") == std::string::npos) return;
+    const Outcome result = run(damaged + "\n");
+    const auto lines = 1 + std::count(damaged.begin(), damaged.end(), '\n');
+    ASSERT_EQ(result.lines.size(), static_cast<std::size_t>(lines)) << damaged;
+    for (const std::string& text : result.lines) {
+      const Json json = Json::parse(text, nullptr, false);
+      ASSERT_TRUE(json.is_object() && json.contains("value") != json.contains("error")) << damaged << "\n" << text;
+    }
+  });
 }
 
 }  // namespace

@@ -169,5 +169,20 @@ TEST(EvalVisibilityFormat, ErrorsNameTheField) {
   }
 }
 
+// Work and memory grow with cells times Gaussians and cells times directions.
+TEST(EvalVisibility, RequestsThatCostTooMuchAreRefused) {
+  const auto error = [](const Json& request) { return answer(request).value("error", std::string()); };
+  EXPECT_EQ(error(request_of(upper_half(257))), "field \"map\": expected 1 to 256 strings");
+  Json request = request_of(upper_half(128));
+  request["count"] = 1025;
+  EXPECT_EQ(error(request), "field \"count\": must be an integer from 1 to 1024");
+  request = request_of(upper_half(256));
+  request["count"] = 257;
+  EXPECT_EQ(error(request), "field \"count\": must be an integer from 1 to 256");
+  request = request_of(upper_half(256));
+  request["directions"] = std::vector<std::vector<int>>(65, {0, 0, 1});
+  EXPECT_EQ(error(request), "field \"directions\": expected at most 64 with a map of this size");
+}
+
 }  // namespace
 }  // namespace heddle

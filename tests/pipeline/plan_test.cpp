@@ -423,6 +423,7 @@ TEST(AccuracyTableFormat, DamagedTablesAreRefused) {
                                  {"heddle accuracy", "heddle chart"},
                                  {"1000.0", "10.0"},
                                  {"0.2,\n  0.4", "0.2"},
+                                 {"\"threads\": 2", "\"threads\": 2e300"},
                                  {"\"threads\": 2", "\"threads\": \"2\""}}) {
     std::string damaged = whole;
     ASSERT_NE(damaged.find(from), std::string::npos) << from;

@@ -178,8 +178,10 @@ TEST_F(DistanceMapsFormat, ReadsWhatItWrote) {
   const DistanceMaps maps = wall_map(Vec3(0.6F, 0.3F, -0.4F).normalized(), Mat3::Identity(), 16);
   maps.write(folder_ / "maps.safetensors", {{"key", "abc"}});
   EXPECT_EQ(TensorFile::read(folder_ / "maps.safetensors").metadata_value("key"), "abc");
-  const DistanceMaps read = DistanceMaps::read(folder_ / "maps.safetensors");
+  const DistanceMaps read = DistanceMaps::read(folder_ / "maps.safetensors", 1);
   EXPECT_EQ(read.vertex_count(), 1U);
+  EXPECT_NE(error_of([&] { DistanceMaps::read(folder_ / "maps.safetensors", 2); }).find("coefficients"), std::string::npos)
+      << "of another mesh";
   EXPECT_EQ(read.compression_error(), maps.compression_error());
   RandomStream random(9, RandomStage::kTest, 0, 0);
   for (int k = 0; k < 100; ++k) {
@@ -196,7 +198,7 @@ TEST_F(DistanceMapsFormat, SizesThatDoNotFitAreNamed) {
     file.add<float>("coefficients", {2, other_stride}, std::vector<float>(2 * other_stride));
     file.add<double>("compression_error", {1}, std::vector<double>(1));
     file.write(folder_ / "bad.safetensors");
-    return error_of([&] { DistanceMaps::read(folder_ / "bad.safetensors"); });
+    return error_of([&] { DistanceMaps::read(folder_ / "bad.safetensors", 2); });
   };
   EXPECT_EQ(message(4, 4, 8, 8), "no error");
   for (const auto& [rows, columns, stride] : {std::array<std::uint64_t, 3>{4, 5, 8}, {3, 3, 8}, {4, 4, 9}, {4, 4, 0}}) {

@@ -228,8 +228,10 @@ TEST_F(WeightingTableFormat, ReadsWhatItWrote) {
   const WeightingTable table(fabric, tangent_samples(fabric, 3), Weighting::kConsistent, settings);
   table.write(folder_ / "table.safetensors", {{"key", "abc"}});
   EXPECT_EQ(TensorFile::read(folder_ / "table.safetensors").metadata_value("key"), "abc");
-  const WeightingTable read = WeightingTable::read(folder_ / "table.safetensors");
+  const WeightingTable read = WeightingTable::read(folder_ / "table.safetensors", table.ranks().size());
   EXPECT_EQ(read.ranks(), table.ranks());
+  EXPECT_NE(error_of([&] { WeightingTable::read(folder_ / "table.safetensors", 9); }).find("not the sizes"), std::string::npos)
+      << "of another fabric";
   EXPECT_EQ(read.bytes(), table.bytes());
   RandomStream random(8, RandomStage::kTest, 0, 0);
   for (int k = 0; k < 200; ++k) {
@@ -248,7 +250,7 @@ TEST_F(WeightingTableFormat, SizesThatDoNotFitAreNamed) {
     file.add<float>("outgoing", {outgoing}, std::vector<float>(outgoing));
     file.add<float>("axes", {6 * 16 * 8}, std::vector<float>(6 * 16 * 8));
     file.write(folder_ / "bad.safetensors");
-    return error_of([&] { WeightingTable::read(folder_ / "bad.safetensors"); });
+    return error_of([&] { WeightingTable::read(folder_ / "bad.safetensors", 1); });
   };
   EXPECT_EQ(message({2, 4, 4}, {1}, 64), "no error");
   for (const auto& ranks : {std::vector<std::int32_t>{9}, {1, 1}, {0}, {-1}, {2000000000}}) {
