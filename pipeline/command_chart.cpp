@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <new>
 #include <set>
 
 #include "formats/atomic_file.h"
@@ -215,6 +216,8 @@ class ChartMaker {
       for (const ReferenceKind kind : kReferenceKinds) compare(kind, colors, row);
     } catch (const Interrupted&) {
       throw;
+    } catch (const std::bad_alloc&) {
+      row.message = "memory ran out";
     } catch (const std::exception& error) {
       row.message = error.what();
     }

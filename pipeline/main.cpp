@@ -8,11 +8,13 @@
 #include <iostream>
 #include <map>
 #include <memory>
+#include <new>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "formats/input_error.h"
+#include "formats/memory_need.h"
 #include "pipeline/cache.h"
 #include "pipeline/commands.h"
 #include "pipeline/eval/eval.h"
@@ -298,6 +300,10 @@ ProgramEnd run_program(int argc, char** argv) {
     return {interrupted.exit_status(), interrupted.what()};
   } catch (const ConfigError& error) {
     return {kWrongUsage, error.what()};
+  } catch (const std::bad_alloc&) {
+    return {kFailed, "memory ran out, " + memory_text(available_memory()) +
+                         " are available now: a smaller picture or crop, fewer repeats of the weave or fewer fibers "
+                         "need less"};
   } catch (const std::exception& error) {
     return {kFailed, error.what()};
   }

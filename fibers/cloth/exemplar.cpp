@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <span>
 #include <cmath>
 
 #include "formats/input_error.h"
@@ -82,6 +83,8 @@ constexpr std::size_t kScatteringNumbers = 10;
 void index_segments(Exemplar& e) {
   e.segment_point.clear();
   e.segment_fiber.clear();
+  e.segment_point.reserve(e.points.size() - e.fiber_count());
+  e.segment_fiber.reserve(e.points.size() - e.fiber_count());
   e.z_min = std::numeric_limits<float>::infinity();
   e.z_max = -e.z_min;
   for (std::uint32_t f = 0; f < e.fiber_count(); ++f) {
@@ -122,8 +125,8 @@ void write_exemplar(const std::filesystem::path& path, const Exemplar& e,
   TensorFileWriter file;
   for (const auto& [key, value] : metadata) file.set_metadata(key, value);
   file.set_metadata("kind", "fibers");
-  std::vector<float> points;
-  for (const Vec3& p : e.points) points.insert(points.end(), {p.x(), p.y(), p.z()});
+  static_assert(sizeof(Vec3) == 3 * sizeof(float));
+  const std::span<const float> points(e.points.data()->data(), 3 * e.points.size());
   std::vector<double> scattering;
   for (const FiberScattering& s : e.scattering) {
     for (const Rgbd* color : {&s.color_r, &s.color_tt}) {
@@ -148,6 +151,7 @@ Exemplar read_exemplar(const std::filesystem::path& path) {
   e.width_mm = tile[0];
   e.height_mm = tile[1];
   const auto points = file.get<float>("points_mm", {0, 3});
+  e.points.reserve(points.size() / 3);
   for (std::size_t i = 0; i + 2 < points.size(); i += 3) {
     e.points.emplace_back(points[i], points[i + 1], points[i + 2]);
   }

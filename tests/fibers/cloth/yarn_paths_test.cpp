@@ -32,6 +32,30 @@ TEST(YarnPathsLaw, CrestsGoOverAndUnderAsTheWeaveSays) {
   }
 }
 
+// Copies of the weave ask for the same crests, but for rounding.
+TEST(YarnPathsLaw, CrestsDoNotDependOnTheNumberOfRepeats) {
+  FabricConfig config = test::small_fabric("satin 8/3");
+  const YarnPaths one = lay_yarns(config);
+  config.repeats_x = 3;
+  config.repeats_y = 5;
+  const YarnPaths many = lay_yarns(config);
+  ASSERT_EQ(many.warp.size(), 3 * one.warp.size());
+  ASSERT_EQ(many.weft.size(), 5 * one.weft.size());
+  for (std::size_t end = 0; end < many.warp.size(); ++end) {
+    EXPECT_NEAR(many.warp[end].length_mm(), 5 * one.warp[0].length_mm(), 1e-12);
+    for (double along = 0; along < many.warp[end].length_mm(); along += 0.0437) {
+      EXPECT_NEAR(many.warp[end].height_at(along), one.warp[end % one.warp.size()].height_at(along), 1e-12);
+    }
+  }
+}
+
+// Takes minutes where every crossing of the tile is looked at.
+TEST(YarnPaths, TheLargestSatinIsLaidAtOnce) {
+  FabricConfig config = test::small_fabric("satin 64/3");
+  config.repeats_x = config.repeats_y = 64;
+  EXPECT_EQ(lay_yarns(config).warp.size(), 4096U);
+}
+
 TEST(YarnPathsLaw, HeightIsPeriodicAndSmooth) {
   const YarnPaths paths = lay_yarns(test::small_fabric("satin 5/2"));
   const YarnPath& yarn = paths.warp[1];
