@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 #include <xxhash.h>
 
+#include <cerrno>
 #include <fstream>
 #include <memory>
+#include <system_error>
 #include <vector>
 
 #include "formats/input_error.h"
@@ -32,18 +34,21 @@ std::string content_hash(std::string_view text) {
 }
 
 std::string content_hash_of_file(const std::filesystem::path& path) {
+  const auto fail = [&path](const char* what, int reason) {
+    throw FileError(fmt::format("{}: {}: {}", path.string(), what, std::generic_category().message(reason)));
+  };
   std::ifstream file(path, std::ios::binary);
+  if (!file) fail("cannot open", errno);
+  if (std::filesystem::is_directory(path)) fail("cannot open", EISDIR);
   const std::unique_ptr<XXH3_state_t, FreeState> state(XXH3_createState());
-  if (!file || state == nullptr || std::filesystem::is_directory(path)) {
-    throw FileError(path.string() + ": cannot open");
-  }
+  if (state == nullptr) fail("cannot open", ENOMEM);
   XXH3_128bits_reset(state.get());
   std::vector<char> block(std::size_t{1} << 20);
   while (file) {
     file.read(block.data(), static_cast<std::streamsize>(block.size()));
     XXH3_128bits_update(state.get(), block.data(), static_cast<std::size_t>(file.gcount()));
   }
-  if (!file.eof()) throw FileError(path.string() + ": cannot read");
+  if (!file.eof()) fail("cannot read", errno);
   return hexadecimal(XXH3_128bits_digest(state.get()));
 }
 

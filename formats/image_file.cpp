@@ -20,8 +20,10 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cerrno>
 #include <fstream>
 #include <span>
+#include <system_error>
 #include <utility>
 
 #include "formats/atomic_file.h"
@@ -129,10 +131,20 @@ void write_exr_to(Imf::OStream& stream, const Image& image) {
   file.writePixels(image.height);
 }
 
+/// OpenEXR takes a file that cannot be read for one of another format.
+void require_readable(const std::filesystem::path& path) {
+  errno = 0;
+  std::ifstream file(path, std::ios::binary);
+  if (file.get() == std::ifstream::traits_type::eof() && errno != 0) {
+    throw FileError(std::generic_category().message(errno));
+  }
+}
+
 /// The header, with every size checked before the library takes memory for it.
 class ExrHeader {
  public:
   explicit ExrHeader(const std::filesystem::path& path) : file_bytes_(std::filesystem::file_size(path)) {
+    require_readable(path);
     bool deep = false;
     bool multi_part = false;
     if (!Imf::isOpenExrFile(path.c_str(), is_tiled_, deep, multi_part)) throw FileError("no OpenEXR file");

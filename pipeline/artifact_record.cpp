@@ -75,8 +75,9 @@ bool publish_artifact(const fs::path& artifact, const fs::path& record_file,
   const ArtifactCheck meanwhile = check_artifact(artifact, record_file);
   if (meanwhile.state == ArtifactState::kSound) return built;
   if (!built) throw FileError(fmt::format("{}: vanished while it was waited for", artifact.string()));
-  write_sealed_json(record_file, record_json(seals_of(temporary.path()), cost));
   std::error_code error;
+  if (fs::is_directory(record_file)) fs::remove_all(record_file, error);
+  write_sealed_json(record_file, record_json(seals_of(temporary.path()), cost));
   if (fs::is_directory(artifact) != fs::is_directory(temporary.path())) fs::remove_all(artifact, error);
   temporary.commit();
   return true;

@@ -165,7 +165,8 @@ def broken_artifacts(shop, states, chance):
             for path in first_of_each_kind(state / "cache" / stage):
                 slow = stage == "surface-weights"  # a second to build
                 versions = list(broken_versions(path.read_bytes(), chance, 1 if slow else FLIPS))
-                for how, instead in versions[::3] if slow else versions:
+                record = path.name.endswith(".record.json")
+                for how, instead in versions[::3] if slow else versions[::2] if record else versions:
                     yield Broken(arguments, state, expected, str(path.relative_to(state)), how, instead)
 
 

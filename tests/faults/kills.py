@@ -15,7 +15,7 @@ import workshop
 from workshop import PACK, PICTURE, PICTURES, Fault, Job, States, differences, old_or_new, temporaries, tree
 
 KILLS = 100  # at random moments
-BEFORE_CALLS = 6  # of each kind of call of each job
+BEFORE_CALLS = 5  # of each kind of call of each job
 CHANGES = ("write", "rename", "open-write", "make-folder", "unlink")
 
 

@@ -484,14 +484,14 @@ def named_folder(path):
     return str(place)
 
 
-def says_why(outcome):
+def says_why(outcome, reason=True):
     """A run that failed by a fault names the file and the system's reason."""
     last = "\n".join(outcome.error.strip().splitlines())
     problems = []
     if "heddle: " not in last:
         problems.append("no message on standard error")
     if outcome.fault and outcome.failed:
-        if outcome.fault.reason() not in last:
+        if reason and outcome.fault.reason() not in last:
             problems.append(f"the message lacks the reason: {outcome.fault.reason()}")
         if not any(named_folder(path) in last for _, _, path in outcome.failed):
             problems.append(f"the message names no file at {named_folder(outcome.failed[0][2])}")

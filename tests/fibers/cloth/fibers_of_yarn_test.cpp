@@ -9,7 +9,7 @@
 namespace heddle {
 namespace {
 
-YarnPath flat_yarn(double length_mm) { return {false, 0.5, length_mm / 4, {0, 0, 0, 0}}; }
+YarnPath flat_yarn(double length_mm) { return {false, 0.5, length_mm / 4, 4, {0, 0, 0, 0}}; }
 
 YarnConfig yarn_of(int plies, int fibers, double wander_deg) {
   YarnConfig yarn;

@@ -23,6 +23,22 @@ TEST(SynthesizeLaw, SameConfigSameBits) {
 }
 
 // The shipped fabrics: full size where they claim it, small where the quick start and the tests need it.
+TEST(SynthesizeLaw, TheForecastCountsTheSegments) {
+  for (const char* notation : {"plain", "twill 3/1", "satin 5/2"}) {
+    FabricConfig config = test::small_fabric(notation);
+    config.repeats_x = 3;
+    config.warp.fibers_per_ply = 5;
+    EXPECT_EQ(forecast_exemplar(config).segments, static_cast<double>(synthesize(config).segment_count())) << notation;
+  }
+}
+
+TEST(SynthesizeLaw, TilesBeyondTheIndicesAreRefused) {
+  FabricConfig config = test::small_fabric();
+  config.repeats_x = config.repeats_y = 64;
+  config.warp.fibers_per_ply = config.weft.fibers_per_ply = 1'000'000;
+  EXPECT_THROW(synthesize(config), std::invalid_argument);
+}
+
 TEST(Synthesize, ShippedFabricsHaveTheSizeTheyClaim) {
   auto summary_of = [](const std::string& name) {
     const TomlTable document = TomlTable::load(std::string(HEDDLE_SOURCE_DIR) + "/configs/fabrics/" + name);
