@@ -301,8 +301,9 @@ ProgramEnd run_program(int argc, char** argv) {
   } catch (const ConfigError& error) {
     return {kWrongUsage, error.what()};
   } catch (const std::bad_alloc&) {
-    return {kFailed, "memory ran out; " + memory_text(available_memory()) +
-                         " are available now. A smaller picture or crop, fewer repeats of the weave or fewer fibers need less"};
+    return {kFailed, "memory ran out, " + memory_text(available_memory()) +
+                         " are available now: a smaller picture or crop, fewer repeats of the weave or fewer fibers "
+                         "need less"};
   } catch (const std::exception& error) {
     return {kFailed, error.what()};
   }
