@@ -39,9 +39,8 @@ std::uint64_t picture_bytes(int width_px, int height_px, int spp, bool with_fibe
   const std::uint64_t colors = spp >= 2 ? 6 : 3;
   const std::uint64_t fibers = with_fiber_layers ? 2 * sizeof(std::uint32_t) + 2 * sizeof(Vec3) + sizeof(float) : 0;
   const std::uint64_t frame = colors * sizeof(Rgb) + sizeof(float) + fibers;
-  // Writing rounds some layers to halves beside the image, and makes the preview.
-  const std::uint64_t written = colors * sizeof(Rgb) / 2 + sizeof(Rgb);
-  const std::uint64_t pixel = frame + std::max<std::uint64_t>(sizeof(PixelSums), frame + written);
+  const std::uint64_t image = frame;  // channel by channel
+  const std::uint64_t pixel = frame + std::max<std::uint64_t>(sizeof(PixelSums), image);
   return pixel * static_cast<std::uint64_t>(width_px) * static_cast<std::uint64_t>(height_px);
 }
 

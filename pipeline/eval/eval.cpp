@@ -217,6 +217,8 @@ Answer answer_line(const std::string& line) {
     if (line.size() > kLongestLine) {
       throw UnreadableLine("longer than " + std::to_string(kLongestLine) + " characters");
     }
+    // The JSON library takes a zero byte for the end of its input.
+    if (line.find('\0') != std::string::npos) throw UnreadableLine("holds a zero byte");
     if (is_nested_too_deeply(line)) {
       throw UnreadableLine("nested deeper than " + std::to_string(kMaxJsonDepth));
     }
