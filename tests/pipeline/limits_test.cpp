@@ -25,11 +25,11 @@ class LimitsEndToEnd : public testing::Test {
     EXPECT_NE(at, std::string::npos) << from;
     return text.replace(at, from.size(), to);
   }
-  /// With at most 8 GB of address space, as by `ulimit -v`.
+  /// With at most 4 GB of address space, as by `ulimit -v`.
   ProgramResult run(const std::vector<std::string>& arguments) const {
     return Program(folder_.path(), arguments, "",
                    [&] {
-                     const rlimit limit = {std::uint64_t{8} << 30, std::uint64_t{8} << 30};
+                     const rlimit limit = {std::uint64_t{4} << 30, std::uint64_t{4} << 30};
                      if (::chdir(folder_.path().c_str()) != 0 || ::setrlimit(RLIMIT_AS, &limit) != 0) ::_exit(125);
                      ::setenv("HEDDLE_CACHE", "cache", 1);
                    })
