@@ -6,6 +6,8 @@
 #include <cmath>
 #include <ostream>
 
+#include "formats/memory_need.h"
+
 namespace heddle {
 namespace {
 
@@ -37,6 +39,12 @@ void Console::redraw(const std::string& text) {
   const std::size_t padding = drawn_ > text.size() ? drawn_ - text.size() : 0;
   *messages_ << '\r' << text << std::string(padding, ' ') << '\r' << std::flush;
   drawn_ = text.size();
+}
+
+void announce_memory(Console& console, const std::string& work, std::uint64_t bytes) {
+  constexpr std::uint64_t kMuch = 1'000'000'000;
+  if (bytes >= kMuch) console.say(fmt::format("{}, {} of memory", work, memory_text(bytes)));
+  require_memory(bytes, work);
 }
 
 Progress::Progress(Console& console, std::string title, std::string unit, std::uint64_t total, std::uint64_t done)

@@ -39,6 +39,10 @@ class Console {
   std::size_t drawn_ = 0;  // characters of the line that is being redrawn
 };
 
+/// Says what a large piece of work takes of memory, from 1 GB on. MemoryError where the machine has less. `work`: with its
+/// size, "synth: 1.4e+07 segments".
+void announce_memory(Console& console, const std::string& work, std::uint64_t bytes);
+
 /// Progress of `total` items of work, `done` of which came from an earlier run. Safe to advance from several threads.
 class Progress {
  public:

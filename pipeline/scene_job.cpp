@@ -9,7 +9,6 @@
 #include "formats/atomic_file.h"
 #include "formats/content_hash.h"
 #include "formats/input_error.h"
-#include "formats/memory_need.h"
 #include "pipeline/interrupt.h"
 #include "pipeline/scene_needs.h"
 #include "pipeline/version.h"
@@ -27,8 +26,6 @@ using Json = nlohmann::ordered_json;
 
 // Version of what all render methods compute; part of every picture's key.
 constexpr int kPictureVersion = 2;
-
-constexpr std::uint64_t kMuchMemory = 1'000'000'000;  // from here on a picture says how much it takes
 
 std::string camera_text(const CameraConfig& camera) {
   const auto list = [](const Vec3d& v) { return fmt::format("{},{},{}", v.x(), v.y(), v.z()); };
@@ -298,9 +295,8 @@ PictureResult SceneJob::render(const PictureRequest& request, const std::string&
   // More samples than one are possible where a picture goes on until it is good enough.
   const std::uint64_t bytes = picture_bytes(request.crop.width, request.crop.height, request.more ? 2 : request.spp,
                                             !traces_paths(request.method));
-  const std::string size = fmt::format("{}: {} x {} pixels", title, request.crop.width, request.crop.height);
-  if (bytes >= kMuchMemory) context_->console->say(fmt::format("{}, {} of memory", size, memory_text(bytes)));
-  require_memory(bytes, size);
+  announce_memory(*context_->console,
+                  fmt::format("{}: {} x {} pixels", title, request.crop.width, request.crop.height), bytes);
   std::string key = picture_key(request);
   const Loaded& loaded = loaded_for(request.method);
   const Camera camera(request.camera);

@@ -14,7 +14,6 @@
 #include "formats/content_hash.h"
 #include "formats/id_volume_file.h"
 #include "formats/input_error.h"
-#include "formats/memory_need.h"
 #include "formats/tensor_file.h"
 #include "pipeline/artifact_record.h"
 #include "pipeline/interrupt.h"
@@ -59,12 +58,8 @@ TransferChunk read_transfer_chunk(const fs::path& path, std::uint32_t first_cell
   return chunk;
 }
 
-/// Says what a stage will need of memory, where that is much, and throws MemoryError where the machine has less.
-void announce(Console* console, const std::string& stage, double items, const char* unit, double bytes) {
-  constexpr double kMuch = 1e9;
-  const auto whole = static_cast<std::uint64_t>(bytes);
-  if (bytes >= kMuch) console->say(fmt::format("{}: {:.3g} {}, {} of memory", stage, items, unit, memory_text(whole)));
-  require_memory(whole, fmt::format("{} of {:.3g} {}", stage, items, unit));
+void announce(Console* console, const char* stage, double items, const char* unit, double bytes) {
+  announce_memory(*console, fmt::format("{}: {:.3g} {}", stage, items, unit), static_cast<std::uint64_t>(bytes));
 }
 
 /// Advances a progress of 100 items by the share done.
@@ -184,7 +179,9 @@ bool is_sound(const Stage& stage, StageContext& context) {
   const fs::path path = context.cache.artifact(stage.name, stage.key, stage.extension);
   if (context.sound.contains(path)) return true;
   const ArtifactCheck check = check_artifact(path, context.cache.record(stage.name, stage.key));
-  if (check.state == ArtifactState::kBroken) context.console->warn(check.problem + "; it is built again");
+  if (check.state == ArtifactState::kBroken && context.broken.insert(path).second) {
+    context.console->warn(check.problem + "; it is built again");
+  }
   if (check.state == ArtifactState::kSound) context.sound.insert(path);
   return check.state == ArtifactState::kSound;
 }

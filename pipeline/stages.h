@@ -86,7 +86,8 @@ struct StageContext {
   std::optional<std::uint64_t> seed;  // in place of the fabric's
   std::vector<StageResult> results;
   WorkTime nested = {};  // spent by stages that the running stage asked for
-  std::set<std::filesystem::path> sound = {};  // artifacts that this command has verified or built
+  std::set<std::filesystem::path> sound = {};   // artifacts that this command has verified or built
+  std::set<std::filesystem::path> broken = {};  // those that it has found broken and named
 
   /// Says how a stage went, once per key, and notes it for the report.
   void report(StageResult result);

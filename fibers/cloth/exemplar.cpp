@@ -3,8 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <span>
 #include <cmath>
+#include <span>
 
 #include "formats/input_error.h"
 #include "formats/tensor_file.h"
