@@ -53,7 +53,10 @@ std::string content_hash_of_file(const std::filesystem::path& path) {
 }
 
 FileSeal seal_of_file(const std::filesystem::path& path) {
-  return {std::filesystem::file_size(path), content_hash_of_file(path)};
+  std::error_code error;
+  const std::uintmax_t size = std::filesystem::file_size(path, error);
+  if (error) throw FileError(fmt::format("{}: cannot open: {}", path.string(), error.message()));
+  return {size, content_hash_of_file(path)};
 }
 
 void verify_seal(const std::filesystem::path& path, const FileSeal& seal, const std::string& source) {

@@ -21,6 +21,7 @@ struct FileSeal {
   std::uint64_t bytes = 0;
   std::string xxh3_128;
 };
+/// Errors: FileError.
 FileSeal seal_of_file(const std::filesystem::path& path);
 /// Reads the whole file. Errors: FileError where it is absent or differs; `source` is the file that states the seal.
 void verify_seal(const std::filesystem::path& path, const FileSeal& seal, const std::string& source);

@@ -248,9 +248,11 @@ std::vector<std::string> stages_built(const Json& report) {
 
 TEST(SignalsEndToEnd, StagesGoOnFromFinishedChunks) {
   const Workshop shop;
-  Program program = shop.start({"precompute", "fabric.toml"});
-  interrupt(program, SIGINT, once_there_is(shop / "cache" / "maps", ".safetensors"));
-  const Json report = shop.report({"precompute", "fabric.toml"});
+  // Several chunks of transfer, each of which takes longer than it takes to notice the first.
+  shop.write("chunks.toml", edited(kSmallFabric, "_paths = 4096", "_paths = 16384"));
+  Program program = shop.start({"precompute", "chunks.toml"});
+  interrupt(program, SIGINT, once_there_is(shop / "cache" / "transfer", ".safetensors"));
+  const Json report = shop.report({"precompute", "chunks.toml"});
   std::uint64_t chunks_found = 0;
   for (const Json& stage : report.at("stages")) {
     chunks_found += stage.at("chunks_found").get<std::uint64_t>();
