@@ -37,7 +37,8 @@ constexpr std::size_t kBufferBytes = std::size_t{1} << 20;
 constexpr std::chrono::hours kForeignLifetime{24};
 
 [[noreturn]] void fail_at(const fs::path& path, const char* what, int reason) {
-  throw FileError(fmt::format("{}: {}: {}", path.string(), what, std::generic_category().message(reason)));
+  throw FileError(
+      fmt::format("{}: {}: {}", path.string(), what, std::generic_category().message(reason)));
 }
 
 /// Calls the system again where a signal cut it short.
@@ -60,10 +61,12 @@ const std::string& machine() {
   return digits;
 }
 
-/// This process's temporary names, and the folders in which it has looked for those of dead processes.
+/// This process's temporary names, and the folders in which it has looked for those of dead
+/// processes.
 struct Registry {
   std::mutex mutex;
-  bool ended = false;  // temporaries are being removed: what is left of them must not be renamed into place
+  // temporaries are being removed: what is left of them must not be renamed into place
+  bool ended = false;
   std::set<fs::path> names;
   std::set<fs::path> searched;
 };
@@ -88,7 +91,8 @@ std::optional<pid_t> process_of(std::string_view name) {
 bool is_left_behind(const fs::path& path) {
   const std::optional<pid_t> process = process_of(path.filename().native());
   if (!process) return false;
-  if (*process == ::getpid()) return !registry().names.contains(path);  // an earlier process of the same number
+  // an earlier process of the same number
+  if (*process == ::getpid()) return !registry().names.contains(path);
   if (*process != 0) return ::kill(*process, 0) != 0 && errno == ESRCH;
   std::error_code error;
   const fs::file_time_type written = fs::last_write_time(path, error);
@@ -99,7 +103,8 @@ bool is_left_behind(const fs::path& path) {
 void remove_left_behind(const fs::path& folder) {
   if (!registry().searched.insert(folder).second) return;
   std::error_code ignored;  // what cannot be listed or removed costs space, nothing else
-  for (fs::directory_iterator entry(folder, ignored), end; !ignored && entry != end; entry.increment(ignored)) {
+  for (fs::directory_iterator entry(folder, ignored), end; !ignored && entry != end;
+       entry.increment(ignored)) {
     std::error_code stays;
     if (is_left_behind(entry->path())) fs::remove_all(entry->path(), stays);
   }
@@ -151,7 +156,8 @@ class Descriptor {
 TemporaryPath::TemporaryPath(const fs::path& target) : target_(resolved(target)) {
   static std::atomic<unsigned> counter{0};
   const fs::path folder = folder_of(target_);
-  path_ = target_.parent_path() / fmt::format("{}{}-{}-{}{}", kPrefix, machine(), ::getpid(), counter++, kSuffix);
+  path_ = target_.parent_path() /
+          fmt::format("{}{}-{}-{}{}", kPrefix, machine(), ::getpid(), counter++, kSuffix);
   const std::lock_guard lock(registry().mutex);
   remove_left_behind(folder);
   registry().names.insert(path_);
@@ -174,7 +180,8 @@ void TemporaryPath::commit() {
     if (reason == EINVAL || reason == ENOSYS) {  // a file system that cannot exchange
       const TemporaryPath aside(target_);
       reason = rename_unless_ended(target_, aside.path_);
-      if (reason == 0 && (reason = rename_unless_ended(path_, target_)) != 0) rename_unless_ended(aside.path_, target_);
+      if (reason == 0 && (reason = rename_unless_ended(path_, target_)) != 0)
+        rename_unless_ended(aside.path_, target_);
     }
     if (reason != 0) fail_at(target_, "cannot replace", reason);
     fs::remove_all(path_, error);
@@ -186,8 +193,9 @@ void TemporaryPath::commit() {
 }
 
 AtomicFile::AtomicFile(const fs::path& target) : temporary_(target) {
-  descriptor_ = uninterrupted(
-      [&] { return ::open(temporary_.path().c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666); });
+  descriptor_ = uninterrupted([&] {
+    return ::open(temporary_.path().c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+  });
   if (descriptor_ < 0) fail_at(temporary_.target(), "cannot create a file in this folder", errno);
 }
 
@@ -215,7 +223,8 @@ void AtomicFile::write(std::span<const std::byte> bytes) {
 
 void AtomicFile::write_now(std::span<const std::byte> bytes) {
   for (std::span<const std::byte> rest = bytes; !rest.empty();) {
-    const ssize_t count = uninterrupted([&] { return ::write(descriptor_, rest.data(), rest.size()); });
+    const ssize_t count =
+        uninterrupted([&] { return ::write(descriptor_, rest.data(), rest.size()); });
     if (count <= 0) fail(count < 0 ? errno : ENOSPC);
     rest = rest.subspan(static_cast<std::size_t>(count));
     position_ += static_cast<std::uint64_t>(count);
@@ -239,7 +248,8 @@ void AtomicFile::commit() {
   check();
   write_buffer();
   struct stat status {};
-  if (uninterrupted([&] { return ::fsync(descriptor_); }) != 0 || ::fstat(descriptor_, &status) != 0) {
+  if (uninterrupted([&] { return ::fsync(descriptor_); }) != 0 ||
+      ::fstat(descriptor_, &status) != 0) {
     fail(errno);
   }
   if (static_cast<std::uint64_t>(status.st_size) != size_) fail(EIO);
@@ -274,7 +284,8 @@ void remove_own_temporaries() noexcept {
 std::vector<std::byte> read_whole_file(const fs::path& path) {
   const Descriptor file(uninterrupted([&] { return ::open(path.c_str(), O_RDONLY | O_CLOEXEC); }));
   struct stat status {};
-  if (file.number() < 0 || ::fstat(file.number(), &status) != 0) fail_at(path, "cannot open", errno);
+  if (file.number() < 0 || ::fstat(file.number(), &status) != 0)
+    fail_at(path, "cannot open", errno);
   if (S_ISDIR(status.st_mode)) fail_at(path, "cannot read", EISDIR);
   require_memory(static_cast<std::uint64_t>(status.st_size), path.string());
   // One byte more than the size, so that the end of the file shows without growing.
@@ -285,8 +296,8 @@ std::vector<std::byte> read_whole_file(const fs::path& path) {
       require_memory(2 * size, path.string());
       bytes.resize(2 * size);
     }
-    const ssize_t count =
-        uninterrupted([&] { return ::read(file.number(), bytes.data() + size, bytes.size() - size); });
+    const ssize_t count = uninterrupted(
+        [&] { return ::read(file.number(), bytes.data() + size, bytes.size() - size); });
     if (count < 0) fail_at(path, "cannot read", errno);
     if (count == 0) break;
     size += static_cast<std::size_t>(count);

@@ -35,7 +35,8 @@ std::string content_hash(std::string_view text) {
 
 std::string content_hash_of_file(const std::filesystem::path& path) {
   const auto fail = [&path](const char* what, int reason) {
-    throw FileError(fmt::format("{}: {}: {}", path.string(), what, std::generic_category().message(reason)));
+    throw FileError(
+        fmt::format("{}: {}: {}", path.string(), what, std::generic_category().message(reason)));
   };
   std::ifstream file(path, std::ios::binary);
   if (!file) fail("cannot open", errno);
@@ -59,18 +60,20 @@ FileSeal seal_of_file(const std::filesystem::path& path) {
   return {size, content_hash_of_file(path)};
 }
 
-void verify_seal(const std::filesystem::path& path, const FileSeal& seal, const std::string& source) {
+void verify_seal(const std::filesystem::path& path, const FileSeal& seal,
+                 const std::string& source) {
   std::error_code error;
   const std::uintmax_t size = std::filesystem::file_size(path, error);
-  if (error) throw FileError(fmt::format("{}: named in {} but: {}", path.string(), source, error.message()));
+  if (error)
+    throw FileError(fmt::format("{}: named in {} but: {}", path.string(), source, error.message()));
   if (size != seal.bytes) {
-    throw FileError(fmt::format("{}: {} bytes, {} says {}: truncated or replaced", path.string(), size, source,
-                                seal.bytes));
+    throw FileError(fmt::format("{}: {} bytes, {} says {}: truncated or replaced", path.string(),
+                                size, source, seal.bytes));
   }
   const std::string found = content_hash_of_file(path);
   if (found != seal.xxh3_128) {
-    throw FileError(
-        fmt::format("{}: checksum {}, {} says {}: corrupt", path.string(), found, source, seal.xxh3_128));
+    throw FileError(fmt::format("{}: checksum {}, {} says {}: corrupt", path.string(), found,
+                                source, seal.xxh3_128));
   }
 }
 

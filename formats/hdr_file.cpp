@@ -21,7 +21,8 @@ namespace {
 
 constexpr int kMaxExtent = 16384;
 constexpr std::uint64_t kMaxValues = std::uint64_t{1} << 28;
-// The new encoding reaches 16 pixels per byte; the old one has no bound, but nobody's sky is this even.
+// The new encoding reaches 16 pixels per byte; the old one has no bound, but nobody's sky is this
+// even.
 constexpr std::uint64_t kMaxPixelsPerByte = 1024;
 
 using Pixel = std::array<std::uint8_t, 4>;  // three mantissas and their exponent
@@ -34,10 +35,13 @@ class Reader {
     read_header();
     Image image;
     read_size(image.width, image.height);
-    const auto pixels = static_cast<std::uint64_t>(image.width) * static_cast<std::uint64_t>(image.height);
-    if (3 * pixels > kMaxValues) fail(fmt::format("{} values (at most {})", 3 * pixels, kMaxValues));
+    const auto pixels =
+        static_cast<std::uint64_t>(image.width) * static_cast<std::uint64_t>(image.height);
+    if (3 * pixels > kMaxValues)
+      fail(fmt::format("{} values (at most {})", 3 * pixels, kMaxValues));
     if (pixels / kMaxPixelsPerByte > bytes_.size()) fail("too short for its size in pixels");
-    require_memory(3 * sizeof(float) * pixels, fmt::format("{} x {} pixels", image.width, image.height));
+    require_memory(3 * sizeof(float) * pixels,
+                   fmt::format("{} x {} pixels", image.width, image.height));
     std::array<std::vector<float>*, 3> channels;
     const char* names[] = {"R", "G", "B"};
     for (std::size_t c = 0; c < 3; ++c) {
@@ -51,10 +55,12 @@ class Reader {
       read_line(line);
       for (const Pixel& pixel : line) {
         const double scale = pixel[3] == 0 ? 0.0 : std::ldexp(1.0 / exposure_, pixel[3] - 136);
-        for (std::size_t c = 0; c < 3; ++c) channels[c]->push_back(static_cast<float>(pixel[c] * scale));
+        for (std::size_t c = 0; c < 3; ++c)
+          channels[c]->push_back(static_cast<float>(pixel[c] * scale));
       }
     }
-    if (at_ != bytes_.size()) throw FileError(fmt::format("{} bytes after the last line", bytes_.size() - at_));
+    if (at_ != bytes_.size())
+      throw FileError(fmt::format("{} bytes after the last line", bytes_.size() - at_));
     for (const std::vector<float>* values : channels) {
       for (const float value : *values) {
         if (!std::isfinite(value)) throw FileError("a value beyond the range of float");
@@ -84,7 +90,8 @@ class Reader {
     bool has_format = false;
     for (std::string_view line = text_line(); !line.empty(); line = text_line()) {
       if (line.starts_with("FORMAT=")) {
-        if (line != "FORMAT=32-bit_rle_rgbe") fail(fmt::format("{} is not supported", printable(line)));
+        if (line != "FORMAT=32-bit_rle_rgbe")
+          fail(fmt::format("{} is not supported", printable(line)));
         has_format = true;
       } else if (line.starts_with("EXPOSURE=")) {
         read_exposure(line.substr(9));
@@ -138,10 +145,11 @@ class Reader {
   void read_line(std::vector<Pixel>& line) {
     const Pixel first = pixel();
     // Widths that the new encoding cannot have are never encoded so.
-    const bool components =
-        line.size() >= 8 && line.size() <= 32767 && first[0] == 2 && first[1] == 2 && first[2] < 128;
+    const bool components = line.size() >= 8 && line.size() <= 32767 && first[0] == 2 &&
+                            first[1] == 2 && first[2] < 128;
     if (components) {
-      if (static_cast<std::size_t>(first[2]) * 256 + first[3] != line.size()) fail("a line of another width");
+      if (static_cast<std::size_t>(first[2]) * 256 + first[3] != line.size())
+        fail("a line of another width");
       for (std::size_t c = 0; c < 4; ++c) read_component(line, c);
     } else {
       read_repeats(line, first);
@@ -159,7 +167,8 @@ class Reader {
     }
   }
 
-  // Flat pixels; (1, 1, 1, n) repeats the pixel before, and each that follows another counts 256 times as much.
+  // Flat pixels; (1, 1, 1, n) repeats the pixel before, and each that follows another counts 256
+  // times as much.
   void read_repeats(std::vector<Pixel>& line, const Pixel& first) {
     int shift = 0;
     Pixel next = first;
@@ -194,7 +203,8 @@ Image read_hdr(const std::filesystem::path& path) {
   try {
     return Reader({reinterpret_cast<const char*>(bytes.data()), bytes.size()}).read();
   } catch (const std::runtime_error& error) {
-    throw FileError(fmt::format("{}: cannot read as a Radiance picture: {}", path.string(), error.what()));
+    throw FileError(
+        fmt::format("{}: cannot read as a Radiance picture: {}", path.string(), error.what()));
   }
 }
 

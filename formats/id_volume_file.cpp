@@ -22,15 +22,17 @@ namespace {
 constexpr int kMaxExtent = 4096;
 constexpr std::uint64_t kMaxVoxels = std::uint64_t{1} << 31;
 constexpr std::int32_t kEmpty = -1;
-[[maybe_unused]] constexpr std::int32_t kMaxId = std::numeric_limits<std::int32_t>::max() - 1;  // OpenVDB takes id - kEmpty
+// OpenVDB takes id - kEmpty
+[[maybe_unused]] constexpr std::int32_t kMaxId = std::numeric_limits<std::int32_t>::max() - 1;
 
 constexpr const char* kGridName = "segment_id";
 constexpr const char* kSizeKey = "size";
 constexpr const char* kVoxelKey = "voxel_mm";
 constexpr const char* kOriginKey = "origin_mm";
 
-// OpenVDB puts a random identifier (36 characters) into the header of each file it writes: after the magic
-// number (8 bytes), three version numbers (4 bytes each) and a flag (1 byte). Here it is the file's checksum.
+// OpenVDB puts a random identifier (36 characters) into the header of each file it writes: after
+// the magic number (8 bytes), three version numbers (4 bytes each) and a flag (1 byte). Here it is
+// the file's checksum.
 constexpr std::size_t kIdentifierAt = 21;
 constexpr std::string_view kZeroIdentifier = "00000000-0000-0000-0000-000000000000";
 
@@ -81,11 +83,14 @@ std::string checksum_of(std::string bytes) {
   return as_identifier(content_hash(bytes));
 }
 
-/// Opens the library's writer into any stream; the file offsets that it notes for other programs need one that can seek.
+/// Opens the library's writer into any stream; the file offsets that it notes for other programs
+/// need one that can seek.
 class SeekableArchive : public openvdb::io::Archive {
  public:
   Ptr copy() const override { return std::make_shared<SeekableArchive>(*this); }
-  void write_to(std::ostream& stream, const openvdb::GridCPtrVec& grids) const { write(stream, grids, true); }
+  void write_to(std::ostream& stream, const openvdb::GridCPtrVec& grids) const {
+    write(stream, grids, true);
+  }
   void write(const openvdb::GridCPtrVec&, const openvdb::MetaMap&) const override { assert(false); }
   using openvdb::io::Archive::write;
 };
@@ -96,7 +101,8 @@ std::string vdb_bytes(const IdVolume& volume, const std::map<std::string, std::s
   grid->setName(kGridName);
   grid->setTransform(transform_of(volume));
   for (const auto& [key, text] : metadata) grid->insertMeta(key, openvdb::StringMetadata(text));
-  grid->insertMeta(kSizeKey, openvdb::Vec3IMetadata({volume.size[0], volume.size[1], volume.size[2]}));
+  grid->insertMeta(kSizeKey,
+                   openvdb::Vec3IMetadata({volume.size[0], volume.size[1], volume.size[2]}));
   grid->insertMeta(kVoxelKey, openvdb::Vec3DMetadata(vec(volume.voxel_mm)));
   grid->insertMeta(kOriginKey, openvdb::Vec3DMetadata(vec(volume.origin_mm)));
   // A Dense wraps memory that may be written to; copyFromDense only reads it.
@@ -127,7 +133,8 @@ IdVolume read_vdb(const std::string& bytes) {
   if (bytes.size() < header) throw FileError("shorter than its header");
   if (bytes.substr(kIdentifierAt, kZeroIdentifier.size()) != checksum_of(bytes)) {
     throw FileError(
-        "its checksum differs: changed or cut short after it was written, or written by another program; OpenVDB "
+        "its checksum differs: changed or cut short after it was written, or written by another "
+        "program; OpenVDB "
         "cannot read such files safely");
   }
   openvdb::initialize();
@@ -136,14 +143,16 @@ IdVolume read_vdb(const std::string& bytes) {
   const auto grid = grids->size() == 1 && grids->front()->getName() == kGridName
                         ? openvdb::gridPtrCast<openvdb::Int32Grid>(grids->front())
                         : nullptr;
-  if (grid == nullptr) throw FileError(fmt::format("'{}' is not its only grid, of 32-bit integers", kGridName));
+  if (grid == nullptr)
+    throw FileError(fmt::format("'{}' is not its only grid, of 32-bit integers", kGridName));
 
   IdVolume volume;
   const openvdb::Vec3i size = required_metadata<openvdb::Vec3IMetadata>(*grid, kSizeKey);
   volume.size = {size.x(), size.y(), size.z()};
   volume.voxel_mm = array(required_metadata<openvdb::Vec3DMetadata>(*grid, kVoxelKey));
   volume.origin_mm = array(required_metadata<openvdb::Vec3DMetadata>(*grid, kOriginKey));
-  if (const std::string problem = size_problem(volume.size); !problem.empty()) throw FileError(problem);
+  if (const std::string problem = size_problem(volume.size); !problem.empty())
+    throw FileError(problem);
   for (int axis = 0; axis < 3; ++axis) {
     if (!(volume.voxel_mm[axis] > 0) || !std::isfinite(volume.voxel_mm[axis]) ||
         !std::isfinite(volume.origin_mm[axis])) {
@@ -157,7 +166,8 @@ IdVolume read_vdb(const std::string& bytes) {
   volume.ids.resize(static_cast<std::size_t>(volume.size[0]) * volume.size[1] * volume.size[2]);
   DenseIds dense(box_of(volume.size), volume.ids.data());
   openvdb::tools::copyToDense(*grid, dense);
-  if (std::any_of(volume.ids.begin(), volume.ids.end(), [](std::int32_t id) { return id < kEmpty; })) {
+  if (std::any_of(volume.ids.begin(), volume.ids.end(),
+                  [](std::int32_t id) { return id < kEmpty; })) {
     throw FileError("an id below -1");
   }
   return volume;
@@ -170,7 +180,8 @@ void write_id_volume(const std::filesystem::path& path, const IdVolume& volume,
   assert(size_problem(volume.size).empty());
   assert(std::all_of(volume.ids.begin(), volume.ids.end(),
                      [](std::int32_t id) { return id >= kEmpty && id <= kMaxId; }));
-  assert(volume.ids.size() == static_cast<std::size_t>(volume.size[0]) * volume.size[1] * volume.size[2]);
+  assert(volume.ids.size() ==
+         static_cast<std::size_t>(volume.size[0]) * volume.size[1] * volume.size[2]);
   std::string bytes;
   try {
     bytes = vdb_bytes(volume, metadata);
@@ -185,7 +196,8 @@ IdVolume read_id_volume(const std::filesystem::path& path) {
   try {
     return read_vdb({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
   } catch (const std::exception& error) {
-    throw FileError(fmt::format("{}: cannot read as an id volume: {}", path.string(), error.what()));
+    throw FileError(
+        fmt::format("{}: cannot read as an id volume: {}", path.string(), error.what()));
   }
 }
 

@@ -37,7 +37,8 @@ namespace {
 constexpr int kMaxExtent = 16384;
 constexpr std::size_t kMaxChannels = 1024;
 constexpr std::uint64_t kMaxSamples = std::uint64_t{1} << 30;  // over all channels: 4 GiB of memory
-constexpr int kRowsAtOnce = 64;                                // rows that are decoded before memory for more is used
+// rows that are decoded before memory for more is used
+constexpr int kRowsAtOnce = 64;
 
 Imf::PixelType pixel_type(ChannelType type) {
   switch (type) {
@@ -75,7 +76,8 @@ CompressionBound bound_of(Imf::Compression compression) {
     case Imf::B44A_COMPRESSION:
       return {32, 11};  // 4 x 4 values of 2 bytes in 3
     case Imf::DWAA_COMPRESSION:
-      return {32, 64 * kDeflate};  // 8 x 8 values of 4 bytes are 4 bytes before deflation; runs as in RLE
+      // 8 x 8 values of 4 bytes are 4 bytes before deflation; runs as in RLE
+      return {32, 64 * kDeflate};
     case Imf::DWAB_COMPRESSION:
       return {256, 64 * kDeflate};
     default:
@@ -85,13 +87,16 @@ CompressionBound bound_of(Imf::Compression compression) {
 
 template <class T>
 Imf::Slice slice_of(Imf::PixelType type, const T* values, const Imath::Box2i& window, int width) {
-  return Imf::Slice::Make(type, values, window, sizeof(T), sizeof(T) * static_cast<std::size_t>(width));
+  return Imf::Slice::Make(type, values, window, sizeof(T),
+                          sizeof(T) * static_cast<std::size_t>(width));
 }
 
-/// OpenEXR writes into a file under construction, whose errors reach the caller even where the library swallows them.
+/// OpenEXR writes into a file under construction, whose errors reach the caller even where the
+/// library swallows them.
 class OutputStream : public Imf::OStream {
  public:
-  OutputStream(const std::string& name, AtomicFile& file) : Imf::OStream(name.c_str()), file_(&file) {}
+  OutputStream(const std::string& name, AtomicFile& file)
+      : Imf::OStream(name.c_str()), file_(&file) {}
   void write(const char bytes[], int count) override {
     file_->write(std::as_bytes(std::span(bytes, static_cast<std::size_t>(count))));
   }
@@ -106,7 +111,8 @@ void write_exr_to(Imf::OStream& stream, const Image& image) {
   const Imath::Box2i window({0, 0}, {image.width - 1, image.height - 1});
   Imf::Header header(window, window);
   header.compression() = Imf::ZIP_COMPRESSION;
-  Imf::addChromaticities(header, Imf::Chromaticities());  // the default is Rec. 709 with white point D65
+  // the default is Rec. 709 with white point D65
+  Imf::addChromaticities(header, Imf::Chromaticities());
   for (const auto& [key, text] : image.metadata) header.insert(key, Imf::StringAttribute(text));
 
   Imf::FrameBuffer pixels;
@@ -118,7 +124,8 @@ void write_exr_to(Imf::OStream& stream, const Image& image) {
     if (channel.type == ChannelType::kHalf) {
       std::vector<Imath::half>& rounded = halves.emplace_back();
       rounded.reserve(channel.values.size());
-      for (const float value : channel.values) rounded.emplace_back(std::clamp(value, -65504.0f, 65504.0f));
+      for (const float value : channel.values)
+        rounded.emplace_back(std::clamp(value, -65504.0f, 65504.0f));
       pixels.insert(name, slice_of(type, rounded.data(), window, image.width));
     } else if (channel.type == ChannelType::kFloat) {
       pixels.insert(name, slice_of(type, channel.values.data(), window, image.width));
@@ -143,11 +150,13 @@ void require_readable(const std::filesystem::path& path) {
 /// The header, with every size checked before the library takes memory for it.
 class ExrHeader {
  public:
-  explicit ExrHeader(const std::filesystem::path& path) : file_bytes_(std::filesystem::file_size(path)) {
+  explicit ExrHeader(const std::filesystem::path& path)
+      : file_bytes_(std::filesystem::file_size(path)) {
     require_readable(path);
     bool deep = false;
     bool multi_part = false;
-    if (!Imf::isOpenExrFile(path.c_str(), is_tiled_, deep, multi_part)) throw FileError("no OpenEXR file");
+    if (!Imf::isOpenExrFile(path.c_str(), is_tiled_, deep, multi_part))
+      throw FileError("no OpenEXR file");
     if (deep || multi_part) throw FileError("deep and multi-part files are not supported");
     check_attributes(path);
     Imf::StdIFStream stream(path.c_str());
@@ -166,26 +175,35 @@ class ExrHeader {
   const Imf::Header& header() const { return header_; }
   int width() const { return width_; }
   int height() const { return height_; }
-  /// Rows to ask for at once: whole chunks, so that none is decoded twice (a file of tiles keeps a row of them).
-  int rows_at_once() const { return std::min(height_, std::max(kRowsAtOnce, bound_of(header_.compression()).rows)); }
+  /// Rows to ask for at once: whole chunks, so that none is decoded twice (a file of tiles keeps a
+  /// row of them).
+  int rows_at_once() const {
+    return std::min(height_, std::max(kRowsAtOnce, bound_of(header_.compression()).rows));
+  }
 
-  /// Bytes to read the picture: its values, a few rows of them, and what the library holds of chunks or tiles.
+  /// Bytes to read the picture: its values, a few rows of them, and what the library holds of
+  /// chunks or tiles.
   std::uint64_t memory() const {
     constexpr std::uint64_t kCopies = 6;  // of a chunk, in the library's decoders
     const auto width = static_cast<std::uint64_t>(width_);
-    std::uint64_t library = kCopies * width * static_cast<std::uint64_t>(bound_of(header_.compression()).rows);
+    std::uint64_t library =
+        kCopies * width * static_cast<std::uint64_t>(bound_of(header_.compression()).rows);
     if (is_tiled_) {
       const Imf::TileDescription& tile = header_.tileDescription();
       library = std::uint64_t{tile.ySize} * (width + kCopies * tile.xSize);
     }
-    return sizeof(float) * channels_ * width * static_cast<std::uint64_t>(height_ + rows_at_once()) +
+    return sizeof(float) * channels_ * width *
+               static_cast<std::uint64_t>(height_ + rows_at_once()) +
            bytes_per_pixel_ * library;
   }
 
-  std::string text() const { return fmt::format("{} x {} pixels, {} channels", width_, height_, channels_); }
+  std::string text() const {
+    return fmt::format("{} x {} pixels, {} channels", width_, height_, channels_);
+  }
 
  private:
-  /// Attributes are name, type, size and value; the library takes memory for any size that it reads.
+  /// Attributes are name, type, size and value; the library takes memory for any size that it
+  /// reads.
   void check_attributes(const std::filesystem::path& path) const {
     std::ifstream file(path, std::ios::binary);
     file.seekg(8);  // magic number and version
@@ -210,7 +228,8 @@ class ExrHeader {
     const std::int64_t width = std::int64_t{window.max.x} - window.min.x + 1;
     const std::int64_t height = std::int64_t{window.max.y} - window.min.y + 1;
     if (width < 1 || height < 1 || width > kMaxExtent || height > kMaxExtent) {
-      throw FileError(fmt::format("{} x {} pixels (at most {} x {})", width, height, kMaxExtent, kMaxExtent));
+      throw FileError(
+          fmt::format("{} x {} pixels (at most {} x {})", width, height, kMaxExtent, kMaxExtent));
     }
     width_ = static_cast<int>(width);
     height_ = static_cast<int>(height);
@@ -232,17 +251,22 @@ class ExrHeader {
   /// Behind the header: a table of 8 bytes per chunk, then the chunks.
   void check_chunks(std::uint64_t table_begin) const {
     const CompressionBound bound = bound_of(header_.compression());
-    const auto parts = [](int extent, std::uint64_t part) { return (static_cast<std::uint64_t>(extent) + part - 1) / part; };
+    const auto parts = [](int extent, std::uint64_t part) {
+      return (static_cast<std::uint64_t>(extent) + part - 1) / part;
+    };
     std::uint64_t chunks = parts(height_, static_cast<std::uint64_t>(bound.rows));
     if (is_tiled_) {
       const Imf::TileDescription& tile = header_.tileDescription();
       chunks = parts(width_, tile.xSize) * parts(height_, tile.ySize);
     }
-    const std::uint64_t least = table_begin + 8 * chunks + pixels() * bytes_per_pixel_ / bound.ratio;
+    const std::uint64_t least =
+        table_begin + 8 * chunks + pixels() * bytes_per_pixel_ / bound.ratio;
     if (least > file_bytes_) throw FileError("too short for its size in pixels");
   }
 
-  std::uint64_t pixels() const { return static_cast<std::uint64_t>(width_) * static_cast<std::uint64_t>(height_); }
+  std::uint64_t pixels() const {
+    return static_cast<std::uint64_t>(width_) * static_cast<std::uint64_t>(height_);
+  }
 
   std::uint64_t file_bytes_;
   Imf::Header header_;
@@ -253,7 +277,8 @@ class ExrHeader {
   std::uint64_t bytes_per_pixel_ = 0;
 };
 
-/// One channel being read: rows are decoded into `rows`, then appended. Memory so grows as the file proves to hold data.
+/// One channel being read: rows are decoded into `rows`, then appended. Memory so grows as the file
+/// proves to hold data.
 struct ChannelReader {
   std::string name;
   ImageChannel* channel;
@@ -262,7 +287,8 @@ struct ChannelReader {
 
   void append(std::size_t count) {
     const auto add = [count](auto& to, const auto& from) {
-      if (!from.empty()) to.insert(to.end(), from.begin(), from.begin() + static_cast<std::ptrdiff_t>(count));
+      if (!from.empty())
+        to.insert(to.end(), from.begin(), from.begin() + static_cast<std::ptrdiff_t>(count));
     };
     add(channel->values, rows);
     add(channel->ids, id_rows);
@@ -270,8 +296,10 @@ struct ChannelReader {
 };
 
 std::vector<ChannelReader> channel_readers(const ExrHeader& checked, Image& image) {
-  const auto pixels = static_cast<std::size_t>(checked.width()) * static_cast<std::size_t>(checked.height());
-  const auto rows = static_cast<std::size_t>(checked.width()) * static_cast<std::size_t>(checked.rows_at_once());
+  const auto pixels =
+      static_cast<std::size_t>(checked.width()) * static_cast<std::size_t>(checked.height());
+  const auto rows =
+      static_cast<std::size_t>(checked.width()) * static_cast<std::size_t>(checked.rows_at_once());
   std::vector<ChannelReader> readers;
   const Imf::ChannelList& channels = checked.header().channels();
   for (auto it = channels.begin(); it != channels.end(); ++it) {
@@ -304,17 +332,20 @@ Image read_exr_from(const std::filesystem::path& path) {
   const Imath::Box2i window = checked.header().dataWindow();
   for (int row = 0; row < image.height; row += checked.rows_at_once()) {
     const int last = std::min(row + checked.rows_at_once(), image.height) - 1;
-    const Imath::Box2i part({window.min.x, window.min.y + row}, {window.max.x, window.min.y + last});
+    const Imath::Box2i part({window.min.x, window.min.y + row},
+                            {window.max.x, window.min.y + last});
     Imf::FrameBuffer buffer;
     for (const ChannelReader& reader : readers) {
       const bool is_id = reader.channel->type == ChannelType::kUint;
-      buffer.insert(reader.name, is_id ? slice_of(Imf::UINT, reader.id_rows.data(), part, image.width)
-                                       : slice_of(Imf::FLOAT, reader.rows.data(), part, image.width));
+      buffer.insert(reader.name, is_id
+                                     ? slice_of(Imf::UINT, reader.id_rows.data(), part, image.width)
+                                     : slice_of(Imf::FLOAT, reader.rows.data(), part, image.width));
     }
     file.setFrameBuffer(buffer);
     file.readPixels(part.min.y, part.max.y);
     for (ChannelReader& filled : readers) {
-      filled.append(static_cast<std::size_t>(last - row + 1) * static_cast<std::size_t>(image.width));
+      filled.append(static_cast<std::size_t>(last - row + 1) *
+                    static_cast<std::size_t>(image.width));
     }
   }
   for (auto it = checked.header().begin(); it != checked.header().end(); ++it) {
@@ -348,7 +379,8 @@ Image read_exr(const std::filesystem::path& path) {
   try {
     return read_exr_from(path);
   } catch (const std::exception& error) {
-    throw FileError(fmt::format("{}: cannot read as an OpenEXR image: {}", path.string(), error.what()));
+    throw FileError(
+        fmt::format("{}: cannot read as an OpenEXR image: {}", path.string(), error.what()));
   }
 }
 

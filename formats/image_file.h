@@ -1,8 +1,8 @@
 #ifndef HEDDLE_FORMATS_IMAGE_FILE_H_
 #define HEDDLE_FORMATS_IMAGE_FILE_H_
-// Multi-channel images: OpenEXR (scan lines, ZIP) with named channels and string metadata, and 8-bit PNG.
-// Row-major, row 0 at the top. Equal content gives equal bytes (no time stamps). Errors: FileError.
-// Tested in tests/formats/image_file_test.cpp.
+// Multi-channel images: OpenEXR (scan lines, ZIP) with named channels and string metadata, and
+// 8-bit PNG. Row-major, row 0 at the top. Equal content gives equal bytes (no time stamps). Errors:
+// FileError. Tested in tests/formats/image_file_test.cpp.
 
 #include <cstdint>
 #include <filesystem>
@@ -16,24 +16,27 @@ enum class ChannelType : std::uint8_t { kHalf, kFloat, kUint };
 
 struct ImageChannel {
   ChannelType type = ChannelType::kHalf;
-  std::vector<float> values;         // [height * width] for kHalf and kFloat
-  std::vector<std::uint32_t> ids;    // [height * width] for kUint
+  std::vector<float> values;       // [height * width] for kHalf and kFloat
+  std::vector<std::uint32_t> ids;  // [height * width] for kUint
 };
 
 struct Image {
   int width = 0;
   int height = 0;
-  std::map<std::string, ImageChannel> channels;   // "R", "single.R", "segment", ... ; layers are named LAYER.CHANNEL
-  std::map<std::string, std::string> metadata;    // string attributes
+  // "R", "single.R", "segment", ... ; layers are named LAYER.CHANNEL
+  std::map<std::string, ImageChannel> channels;
+  std::map<std::string, std::string> metadata;  // string attributes
 };
 
 /// Writes atomically. Half channels are clamped to the largest finite half (65504).
 void write_exr(const std::filesystem::path& path, const Image& image);
-/// Reads flat scan-line or tiled single-part files up to 16384 x 16384 and 1024 channels; refuses deep and multi-part.
+/// Reads flat scan-line or tiled single-part files up to 16384 x 16384 and 1024 channels; refuses
+/// deep and multi-part.
 Image read_exr(const std::filesystem::path& path);
 
 /// [height][width][3] bytes, written atomically.
-void write_png(const std::filesystem::path& path, int width, int height, const std::vector<std::uint8_t>& rgb);
+void write_png(const std::filesystem::path& path, int width, int height,
+               const std::vector<std::uint8_t>& rgb);
 
 }  // namespace heddle
 

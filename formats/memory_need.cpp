@@ -76,14 +76,15 @@ std::uint64_t available_memory() {
 std::string memory_text(std::uint64_t bytes) {
   const auto number = static_cast<double>(bytes);
   if (number >= 1e9) return fmt::format("{:.1f} GB", number / 1e9);
-  return fmt::format("{:.3g} {}", number >= 1e6 ? number / 1e6 : number / 1e3, number >= 1e6 ? "MB" : "kB");
+  return fmt::format("{:.3g} {}", number >= 1e6 ? number / 1e6 : number / 1e3,
+                     number >= 1e6 ? "MB" : "kB");
 }
 
 void require_memory(std::uint64_t bytes, const std::string& purpose) {
   const std::uint64_t available = available_memory();
   if (bytes <= available) return;
-  throw MemoryError(fmt::format("{}: needs {} of memory, {} are available", purpose, memory_text(bytes),
-                                memory_text(available)));
+  throw MemoryError(fmt::format("{}: needs {} of memory, {} are available", purpose,
+                                memory_text(bytes), memory_text(available)));
 }
 
 }  // namespace heddle

@@ -69,8 +69,8 @@ class Parser {
     } else if (keyword == "f") {
       add_face(rest);
     }
-    // Everything else (materials, groups, lines, ...) has no meaning here; files named by it are never
-    // opened.
+    // Everything else (materials, groups, lines, ...) has no meaning here; files named by it are
+    // never opened.
   }
 
   /// The first N numbers of a line; more may follow (weights, vertex colours).
@@ -93,12 +93,13 @@ class Parser {
 
   /// The last of the places read so far.
   template <std::size_t N>
-  void check_place(const char* what, const std::vector<std::array<float, N>>& places, double mm_per_unit) const {
+  void check_place(const char* what, const std::vector<std::array<float, N>>& places,
+                   double mm_per_unit) const {
     for (const float coordinate : places.back()) {
       const double mm = coordinate * mm_per_unit;
       if (std::abs(mm) <= kMaxCoordinateMm) continue;
-      fail(fmt::format("{} {}: a coordinate of {:g} mm; at most {:g} mm (1 km) either way", what, places.size(), mm,
-                       kMaxCoordinateMm));
+      fail(fmt::format("{} {}: a coordinate of {:g} mm; at most {:g} mm (1 km) either way", what,
+                       places.size(), mm, kMaxCoordinateMm));
     }
   }
 
@@ -109,7 +110,8 @@ class Parser {
             static_cast<float>(v[2] / length)};
   }
 
-  /// An index as written (from 1; negative: counted back from the last one read) to an index from 0.
+  /// An index as written (from 1; negative: counted back from the last one read) to an index from
+  /// 0.
   std::int64_t index(std::string_view text, std::size_t count, const char* what) const {
     std::int64_t written = 0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), written);

@@ -18,7 +18,8 @@
 
 namespace heddle {
 
-static_assert(std::endian::native == std::endian::little, "tensors are stored as they lie in memory");
+static_assert(std::endian::native == std::endian::little,
+              "tensors are stored as they lie in memory");
 
 namespace {
 
@@ -26,7 +27,8 @@ using OrderedJson = nlohmann::ordered_json;  // for writing: finds a key by look
 using Json = nlohmann::json;
 
 constexpr std::uint64_t kMaxHeaderBytes = 100'000'000;
-constexpr std::size_t kMaxNames = 10'000;  // tensors, or entries of metadata; our own files hold fewer than ten
+// tensors, or entries of metadata; our own files hold fewer than ten
+constexpr std::size_t kMaxNames = 10'000;
 constexpr std::string_view kMetadataKey = "__metadata__";
 
 struct TypeInfo {
@@ -58,7 +60,8 @@ std::optional<std::uint64_t> byte_count(TensorType type, const std::vector<std::
   return bytes;
 }
 
-/// Refuses what a tree of values would hide or could choke on: repeated keys, deep nesting, too many names.
+/// Refuses what a tree of values would hide or could choke on: repeated keys, deep nesting, too
+/// many names.
 class HeaderCheck : public nlohmann::json_sax<Json> {
  public:
   const std::string& problem() const { return problem_; }
@@ -83,7 +86,8 @@ class HeaderCheck : public nlohmann::json_sax<Json> {
     problem_ = fmt::format("the key \"{}\" occurs twice", name);
     return false;
   }
-  bool parse_error(std::size_t position, const std::string&, const nlohmann::detail::exception&) override {
+  bool parse_error(std::size_t position, const std::string&,
+                   const nlohmann::detail::exception&) override {
     problem_ = fmt::format("the header is not JSON (at its byte {})", position);
     return false;
   }
@@ -173,16 +177,16 @@ void TensorFileWriter::set_metadata(const std::string& key, const std::string& v
   metadata_[key] = value;
 }
 
-void TensorFileWriter::add_raw(const std::string& name, TensorType type, std::vector<std::uint64_t> shape,
-                               std::span<const std::byte> bytes) {
+void TensorFileWriter::add_raw(const std::string& name, TensorType type,
+                               std::vector<std::uint64_t> shape, std::span<const std::byte> bytes) {
   assert(name != kMetadataKey && !tensors_.contains(name));
   assert(byte_count(type, shape) == bytes.size());
   tensors_[name] = {type, std::move(shape), {bytes.begin(), bytes.end()}};
 }
 
 void TensorFileWriter::write(const std::filesystem::path& path) const {
-  // Largest elements first: each tensor then starts at a multiple of its element size. The map gives the name
-  // order.
+  // Largest elements first: each tensor then starts at a multiple of its element size. The map
+  // gives the name order.
   std::vector<const std::pair<const std::string, Tensor>*> order;
   for (const auto& item : tensors_) order.push_back(&item);
   std::stable_sort(order.begin(), order.end(), [](const auto* a, const auto* b) {
@@ -210,7 +214,8 @@ void TensorFileWriter::write(const std::filesystem::path& path) const {
   text.resize((text.size() + 7) / 8 * 8,
               ' ');  // 8 bytes of length before it: the data start at a multiple of 8
   const std::uint64_t header_bytes = text.size();
-  if (header_bytes > kMaxHeaderBytes) throw FileError(path.string() + ": the header is longer than 100 MB");
+  if (header_bytes > kMaxHeaderBytes)
+    throw FileError(path.string() + ": the header is longer than 100 MB");
 
   std::vector<std::byte> bytes(sizeof(header_bytes) + header_bytes + offset);
   std::byte* out = bytes.data();
@@ -240,8 +245,8 @@ TensorFile TensorFile::read(const std::filesystem::path& path) {
   const std::size_t data_begin = sizeof(header_bytes) + header_bytes;
   if (data_begin > file.data_.size()) fail("the header passes the end of the file");
 
-  const std::string_view text(reinterpret_cast<const char*>(file.data_.data()) + sizeof(header_bytes),
-                              header_bytes);
+  const std::string_view text(
+      reinterpret_cast<const char*>(file.data_.data()) + sizeof(header_bytes), header_bytes);
   if (!text.starts_with('{')) fail("the header does not start with '{'");
   // The JSON reader takes a zero byte for the end of its input.
   if (text.find('\0') != std::string_view::npos) fail("the header holds a zero byte");
@@ -266,15 +271,17 @@ TensorFile TensorFile::read(const std::filesystem::path& path) {
                             value.contains("shape") && value.contains("data_offsets");
     if (!keys_known) fail_tensor("its keys must be dtype, shape and data_offsets");
     const auto is_index_array = [](const Json& array) {
-      return array.is_array() &&
-             std::all_of(array.begin(), array.end(), [](const Json& v) { return v.is_number_unsigned(); });
+      return array.is_array() && std::all_of(array.begin(), array.end(),
+                                             [](const Json& v) { return v.is_number_unsigned(); });
     };
     const Json& dtype = value["dtype"];
-    const TypeInfo* type = std::find_if(std::begin(kTypes), std::end(kTypes), [&](const TypeInfo& candidate) {
-      return dtype.is_string() && dtype.get_ref<const std::string&>() == candidate.name;
-    });
+    const TypeInfo* type =
+        std::find_if(std::begin(kTypes), std::end(kTypes), [&](const TypeInfo& candidate) {
+          return dtype.is_string() && dtype.get_ref<const std::string&>() == candidate.name;
+        });
     if (type == std::end(kTypes)) fail_tensor(fmt::format("unsupported dtype {}", dtype.dump()));
-    if (!is_index_array(value["shape"])) fail_tensor("its shape is not an array of natural numbers");
+    if (!is_index_array(value["shape"]))
+      fail_tensor("its shape is not an array of natural numbers");
     if (!is_index_array(value["data_offsets"]) || value["data_offsets"].size() != 2) {
       fail_tensor("data_offsets is not a pair of natural numbers");
     }
@@ -282,13 +289,14 @@ TensorFile TensorFile::read(const std::filesystem::path& path) {
     const std::uint64_t begin = value["data_offsets"][0].get<std::uint64_t>();
     const std::uint64_t end = value["data_offsets"][1].get<std::uint64_t>();
     const std::optional<std::uint64_t> expected = byte_count(type->type, shape);
-    if (!expected) fail_tensor(fmt::format("the size of {} {} overflows", type->name, shape_text(shape)));
+    if (!expected)
+      fail_tensor(fmt::format("the size of {} {} overflows", type->name, shape_text(shape)));
     if (end < begin || end > file.data_.size() - data_begin) {
       fail_tensor(fmt::format("data_offsets [{}, {}] pass the end of the file", begin, end));
     }
     if (end - begin != *expected) {
-      fail_tensor(fmt::format("{} {} needs {} bytes, data_offsets give {}", type->name, shape_text(shape),
-                              *expected, end - begin));
+      fail_tensor(fmt::format("{} {} needs {} bytes, data_offsets give {}", type->name,
+                              shape_text(shape), *expected, end - begin));
     }
     extents.emplace_back(begin, end);
     file.entries_[name] = {type->type, shape, data_begin + begin, end - begin};
@@ -302,25 +310,28 @@ TensorFile TensorFile::read(const std::filesystem::path& path) {
     covered = end;
   }
   if (covered != file.data_.size() - data_begin) {
-    fail(fmt::format("{} bytes of data, the header describes {}", file.data_.size() - data_begin, covered));
+    fail(fmt::format("{} bytes of data, the header describes {}", file.data_.size() - data_begin,
+                     covered));
   }
   return file;
 }
 
 const std::string& TensorFile::metadata_value(const std::string& key) const {
   const auto it = metadata_.find(key);
-  if (it == metadata_.end()) throw FileError(fmt::format("{}: no metadata \"{}\"", path_.string(), key));
+  if (it == metadata_.end())
+    throw FileError(fmt::format("{}: no metadata \"{}\"", path_.string(), key));
   return it->second;
 }
 
 const std::vector<std::uint64_t>& TensorFile::shape(const std::string& name) const {
   const auto it = entries_.find(name);
-  if (it == entries_.end()) throw FileError(fmt::format("{}: no tensor \"{}\"", path_.string(), name));
+  if (it == entries_.end())
+    throw FileError(fmt::format("{}: no tensor \"{}\"", path_.string(), name));
   return it->second.shape;
 }
 
-std::span<const std::byte> TensorFile::checked_bytes(const std::string& name, TensorType type,
-                                                     const std::vector<std::uint64_t>& shape) const {
+std::span<const std::byte> TensorFile::checked_bytes(
+    const std::string& name, TensorType type, const std::vector<std::uint64_t>& shape) const {
   const std::vector<std::uint64_t>& found = this->shape(name);
   const Entry& entry = entries_.at(name);
   const auto fail = [&](const std::string& reason) {

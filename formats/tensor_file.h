@@ -1,10 +1,11 @@
 #ifndef HEDDLE_FORMATS_TENSOR_FILE_H_
 #define HEDDLE_FORMATS_TENSOR_FILE_H_
-// Tensor files in the published safetensors layout: u64 little-endian header length, JSON header, raw row-major
-// little-endian tensors, contiguous. Equal content gives equal bytes (fixed key order, no time stamps).
-// Reader: every limit of the reference reader is enforced (header size, exact contiguity, exact file length, known
-// dtypes, checked products, no duplicate keys); see formats/README.md. Errors: FileError naming the file and the reason.
-// Tested in tests/formats/tensor_file_test.cpp.
+// Tensor files in the published safetensors layout: u64 little-endian header length, JSON header,
+// raw row-major little-endian tensors, contiguous. Equal content gives equal bytes (fixed key
+// order, no time stamps). Reader: every limit of the reference reader is enforced (header size,
+// exact contiguity, exact file length, known dtypes, checked products, no duplicate keys); see
+// formats/README.md. Errors: FileError naming the file and the reason. Tested in
+// tests/formats/tensor_file_test.cpp.
 
 #include <cstddef>
 #include <cstdint>
@@ -19,7 +20,8 @@ namespace heddle {
 
 enum class TensorType : std::uint8_t { kU8, kU16, kU32, kU64, kI32, kF16, kF32, kF64 };
 
-/// IEEE half as stored; convert with half_from_float / float_from_half (F16C instructions, round to nearest even).
+/// IEEE half as stored; convert with half_from_float / float_from_half (F16C instructions, round to
+/// nearest even).
 struct Half {
   std::uint16_t bits = 0;
 };
@@ -27,9 +29,11 @@ Half half_from_float(float value);
 float float_from_half(Half value);
 
 template <class T>
-TensorType tensor_type_of();  // specialised for uint8_t, uint16_t, uint32_t, uint64_t, int32_t, Half, float, double
+// specialised for uint8_t, uint16_t, uint32_t, uint64_t, int32_t, Half, float, double
+TensorType tensor_type_of();
 
-/// Collects tensors and string metadata, then writes them in one atomic step (temporary name, flush, rename).
+/// Collects tensors and string metadata, then writes them in one atomic step (temporary name,
+/// flush, rename).
 class TensorFileWriter {
  public:
   void set_metadata(const std::string& key, const std::string& value);
@@ -70,8 +74,8 @@ class TensorFile {
   const std::string& metadata_value(const std::string& key) const;
   const std::filesystem::path& path() const { return path_; }
 
-  /// Typed copy of a tensor. Errors: absent, wrong type, shape different from `shape`. A zero in `shape` matches any
-  /// extent. For float types every value must be finite.
+  /// Typed copy of a tensor. Errors: absent, wrong type, shape different from `shape`. A zero in
+  /// `shape` matches any extent. For float types every value must be finite.
   template <class T>
   std::vector<T> get(const std::string& name, const std::vector<std::uint64_t>& shape) const {
     const std::span<const std::byte> bytes = checked_bytes(name, tensor_type_of<T>(), shape);

@@ -21,7 +21,8 @@ namespace {
 
 // Hand-written configs take a few kilobytes. A document takes up to 140 times its size in memory.
 constexpr std::size_t kMaxDocumentBytes = std::size_t{1} << 20;
-// Tables and arrays within each other. Ours need fewer than ten; toml++ and this file walk them by recursion.
+// Tables and arrays within each other. Ours need fewer than ten; toml++ and this file walk them by
+// recursion.
 constexpr std::size_t kMaxDepth = 64;
 
 struct Unit {
@@ -77,8 +78,8 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
         d[i][j] = i + j;
         continue;
       }
-      d[i][j] =
-          std::min({d[i - 1][j] + 1, d[i][j - 1] + 1, d[i - 1][j - 1] + (a[i - 1] == b[j - 1] ? 0u : 1u)});
+      d[i][j] = std::min(
+          {d[i - 1][j] + 1, d[i][j - 1] + 1, d[i - 1][j - 1] + (a[i - 1] == b[j - 1] ? 0u : 1u)});
       if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) {
         d[i][j] = std::min(d[i][j], d[i - 2][j - 2] + 1);
       }
@@ -124,10 +125,12 @@ std::string shortened(std::string_view text) {
   return std::string(text.substr(0, end)) + "...";
 }
 
-/// The source line (in part, where it is long) and a caret under the column, which counts code points from 1.
+/// The source line (in part, where it is long) and a caret under the column, which counts code
+/// points from 1.
 std::string excerpt(std::string_view line, std::size_t column) {
   constexpr std::size_t kWidth = 120;
-  constexpr std::size_t kBefore = 60;  // of these to the left of the caret, where the beginning is left out
+  // of these to the left of the caret, where the beginning is left out
+  constexpr std::size_t kBefore = 60;
   const std::size_t first = column > kWidth ? column - 1 - kBefore : 0;
   std::string source = first > 0 ? "..." : "";
   std::string caret(source.size(), ' ');
@@ -144,8 +147,9 @@ std::string excerpt(std::string_view line, std::size_t column) {
   return "\n  " + printable(source) + "\n  " + caret + "^";
 }
 
-/// Finds where tables and arrays are nested deeper than kMaxDepth, before toml++ builds them. Exact up to the first syntax
-/// error, which toml++ reports: names of a header, dots of keys, and brackets count; those in strings and comments do not.
+/// Finds where tables and arrays are nested deeper than kMaxDepth, before toml++ builds them. Exact
+/// up to the first syntax error, which toml++ reports: names of a header, dots of keys, and
+/// brackets count; those in strings and comments do not.
 class DepthScan {
  public:
   explicit DepthScan(std::string_view text) : text_(text) {}
@@ -162,7 +166,7 @@ class DepthScan {
  private:
   /// One open bracket, or the document.
   struct Level {
-    std::size_t depth;      // tables and arrays around what it holds
+    std::size_t depth;  // tables and arrays around what it holds
     bool is_array;
     bool in_value = false;  // past a '=': a dot is no new table
     std::size_t dots = 0;   // of the key before
@@ -254,7 +258,8 @@ class DepthScan {
 std::string describe(const toml::node& node) {
   if (const auto* value = node.as_string()) return "the string \"" + shortened(value->get()) + "\"";
   if (const auto* value = node.as_integer()) return fmt::format("the integer {}", value->get());
-  if (const auto* value = node.as_floating_point()) return fmt::format("the number {}", value->get());
+  if (const auto* value = node.as_floating_point())
+    return fmt::format("the number {}", value->get());
   if (const auto* value = node.as_boolean()) return fmt::format("the boolean {}", value->get());
   if (const auto* value = node.as_array()) return fmt::format("an array of {}", value->size());
   return node.is_table() ? "a table" : "a date or time";
@@ -264,7 +269,8 @@ std::string range_text(const NumberRange& range) {
   const NumberRange unbounded;
   const bool below = range.min > unbounded.min;
   const bool above = range.max < unbounded.max;
-  if (below && above) return fmt::format("{}{}, {}]", range.exclusive_min ? "(" : "[", range.min, range.max);
+  if (below && above)
+    return fmt::format("{}{}, {}]", range.exclusive_min ? "(" : "[", range.min, range.max);
   if (below) return fmt::format("{} {}", range.exclusive_min ? ">" : ">=", range.min);
   return above ? fmt::format("<= {}", range.max) : "";
 }
@@ -290,7 +296,8 @@ bool contains(const NumberRange& range, double value) {
 }
 
 [[noreturn]] void fail_size(const std::string& name, std::uintmax_t size) {
-  throw ConfigError(fmt::format("{}: {} bytes; a config has at most {}", name, size, kMaxDocumentBytes));
+  throw ConfigError(
+      fmt::format("{}: {} bytes; a config has at most {}", name, size, kMaxDocumentBytes));
 }
 
 /// Minimal JSON-like text of a value; toml++ keeps the keys of a table sorted.
@@ -337,7 +344,8 @@ void append_canonical(std::string& out, const toml::node& node) {
     out += fmt::format("{}", integer->get());
   } else if (const auto* number = node.as_floating_point()) {
     out +=
-        fmt::format("{}", number->get());  // 1.0 gives "1", as the integer 1 does: they mean the same number
+        // 1.0 gives "1", as the integer 1 does: they mean the same number
+        fmt::format("{}", number->get());
   } else if (const auto* boolean = node.as_boolean()) {
     out += boolean->get() ? "true" : "false";
   } else {
@@ -354,11 +362,12 @@ void append_canonical(std::string& out, const toml::node& node) {
 
 }  // namespace
 
-/// A table of the file, and what was asked of it. Asking does not change the document, so the records are
-/// mutable.
+/// A table of the file, and what was asked of it. Asking does not change the document, so the
+/// records are mutable.
 struct TomlTable::Node {
   const toml::table* values = nullptr;
-  std::string title;              // for messages: "[yarn.warp]", "[[light]]"; empty for the whole document
+  // for messages: "[yarn.warp]", "[[light]]"; empty for the whole document
+  std::string title;
   std::string full_name;          // "yarn.warp"
   toml::source_position place{};  // of the table's name
   std::map<std::string, std::unique_ptr<Node>, std::less<>> tables;
@@ -412,9 +421,11 @@ struct TomlTable::Document {
     node.values = &values;
     for (const auto& [key, value] : values) {
       const std::string key_text(key.str());
-      const auto make_child = [&, &key = key](const toml::table& child, std::string_view open, std::string_view close) {
+      const auto make_child = [&, &key = key](const toml::table& child, std::string_view open,
+                                              std::string_view close) {
         auto result = std::make_unique<Node>();
-        result->full_name = node.full_name.empty() ? shortened(key_text) : node.full_name + "." + shortened(key_text);
+        result->full_name = node.full_name.empty() ? shortened(key_text)
+                                                   : node.full_name + "." + shortened(key_text);
         result->title = fmt::format("{}{}{}", open, result->full_name, close);
         result->place = child.source().begin.line > 0 ? child.source().begin : key.source().begin;
         build(*result, child);
@@ -423,7 +434,8 @@ struct TomlTable::Document {
       if (const toml::table* table = value.as_table()) {
         node.tables[key_text] = make_child(*table, "[", "]");
       } else if (const toml::array* array = value.as_array();
-                 array != nullptr && !array->empty() && array->is_homogeneous(toml::node_type::table)) {
+                 array != nullptr && !array->empty() &&
+                 array->is_homogeneous(toml::node_type::table)) {
         for (const toml::node& element : *array) {
           node.table_arrays[key_text].push_back(make_child(*element.as_table(), "[[", "]]"));
         }
@@ -431,38 +443,47 @@ struct TomlTable::Document {
     }
   }
 
-  /// A required key that is absent. Points at a key that differs in its unit only, else at the table.
-  [[noreturn]] void fail_missing(const Node& node, std::string_view key, const std::string& expected) const {
+  /// A required key that is absent. Points at a key that differs in its unit only, else at the
+  /// table.
+  [[noreturn]] void fail_missing(const Node& node, std::string_view key,
+                                 const std::string& expected) const {
     const Unit* unit = unit_of(key);
-    const std::string what = unit == nullptr ? expected : fmt::format("{}, in {}", expected, unit->spelled);
+    const std::string what =
+        unit == nullptr ? expected : fmt::format("{}, in {}", expected, unit->spelled);
     std::vector<std::string_view> unasked;
     for (const auto& [present, value] : *node.values) {
       if (node.asked.contains(present.str())) continue;
       if (differ_by_unit_only(present.str(), key)) {
-        fail_at(present.source().begin, fmt::format("wrong unit: the expected key is '{}' ({}), found '{}'",
-                                                    key, what, present.str()));
+        fail_at(present.source().begin,
+                fmt::format("wrong unit: the expected key is '{}' ({}), found '{}'", key, what,
+                            present.str()));
       }
       unasked.push_back(present.str());
     }
     const std::string similar = nearest(key, unasked);
-    const std::string hint = similar.empty() ? ""
-                                             : fmt::format("; is '{}' on line {} meant for it?", similar,
-                                                           node.find_key(similar)->source().begin.line);
-    fail_at(node.place, fmt::format("missing key '{}' {}: expected {}{}", key, node.in_title(), what, hint));
+    const std::string hint = similar.empty()
+                                 ? ""
+                                 : fmt::format("; is '{}' on line {} meant for it?", similar,
+                                               node.find_key(similar)->source().begin.line);
+    fail_at(node.place,
+            fmt::format("missing key '{}' {}: expected {}{}", key, node.in_title(), what, hint));
   }
 
   [[noreturn]] void fail_wrong_value(std::string_view key, const toml::node& value,
                                      const std::string& expected) const {
-    fail_at(value.source().begin, fmt::format("'{}': expected {}, found {}", key, expected, describe(value)));
+    fail_at(value.source().begin,
+            fmt::format("'{}': expected {}, found {}", key, expected, describe(value)));
   }
 
-  double checked_number(std::string_view key, const toml::node& value, const NumberRange& range) const {
+  double checked_number(std::string_view key, const toml::node& value,
+                        const NumberRange& range) const {
     const auto* integer = value.as_integer();
     const auto* number = value.as_floating_point();
     const std::string expected = with_range("a number", range_text(range));
     if (integer == nullptr && number == nullptr) fail_wrong_value(key, value, expected);
     const double result = integer != nullptr ? static_cast<double>(integer->get()) : number->get();
-    if (!std::isfinite(result)) fail_wrong_value(key, value, "a finite number" + expected.substr(8));
+    if (!std::isfinite(result))
+      fail_wrong_value(key, value, "a finite number" + expected.substr(8));
     if (!contains(range, result)) fail_wrong_value(key, value, expected);
     return result;
   }
@@ -545,7 +566,8 @@ TomlTable TomlTable::parse(std::string_view text, const std::string& name) {
     begin = end + 1;
   }
   if (const auto place = DepthScan(text).first_too_deep()) {
-    document->fail_at(*place, fmt::format("syntax: more than {} tables and arrays within each other", kMaxDepth));
+    document->fail_at(
+        *place, fmt::format("syntax: more than {} tables and arrays within each other", kMaxDepth));
   }
   try {
     document->values = toml::parse(text, name);
@@ -562,9 +584,12 @@ bool TomlTable::has(std::string_view key) const {
   return node_->find(key) != nullptr;
 }
 
-double TomlTable::number(std::string_view key, NumberRange range, std::optional<double> fallback) const {
-  node_->record(key, "number", range_text(range), fallback ? fmt::format("{}", *fallback) : "required");
-  if (const toml::node* value = node_->find(key)) return document_->checked_number(key, *value, range);
+double TomlTable::number(std::string_view key, NumberRange range,
+                         std::optional<double> fallback) const {
+  node_->record(key, "number", range_text(range),
+                fallback ? fmt::format("{}", *fallback) : "required");
+  if (const toml::node* value = node_->find(key))
+    return document_->checked_number(key, *value, range);
   if (fallback) return *fallback;
   document_->fail_missing(*node_, key, with_range("a number", range_text(range)));
 }
@@ -645,10 +670,10 @@ std::array<double, 3> TomlTable::number3(std::string_view key, NumberRange range
   return document_->numbers<3>(*node_, key, range, fallback);
 }
 
-std::vector<double> TomlTable::numbers(std::string_view key, NumberRange range, std::size_t min_count,
-                                       std::size_t max_count) const {
-  const std::string expected =
-      fmt::format("an array of {} to {} numbers{}", min_count, max_count, with_range("", range_text(range)));
+std::vector<double> TomlTable::numbers(std::string_view key, NumberRange range,
+                                       std::size_t min_count, std::size_t max_count) const {
+  const std::string expected = fmt::format("an array of {} to {} numbers{}", min_count, max_count,
+                                           with_range("", range_text(range)));
   node_->record(key, "number[]", range_text(range), "required");
   const toml::node* value = node_->find(key);
   if (value == nullptr) document_->fail_missing(*node_, key, expected);
@@ -657,7 +682,8 @@ std::vector<double> TomlTable::numbers(std::string_view key, NumberRange range, 
     document_->fail_wrong_value(key, *value, expected);
   }
   std::vector<double> result;
-  for (const toml::node& element : *array) result.push_back(document_->checked_number(key, element, range));
+  for (const toml::node& element : *array)
+    result.push_back(document_->checked_number(key, element, range));
   return result;
 }
 
@@ -670,7 +696,8 @@ std::filesystem::path TomlTable::existing_file(std::string_view key) const {
   std::filesystem::path path = std::filesystem::path(document_->name).parent_path() / text->get();
   std::error_code ignored;
   if (!std::filesystem::is_regular_file(path, ignored)) {
-    document_->fail_at(value->source().begin, fmt::format("'{}': there is no file '{}'", key, path.string()));
+    document_->fail_at(value->source().begin,
+                       fmt::format("'{}': there is no file '{}'", key, path.string()));
   }
   return path;
 }
@@ -732,7 +759,8 @@ void TomlTable::finish() const {
   std::string hint;
   for (const auto& [name, asked] : unknown->node->asked) {
     known.push_back(name);
-    if (differ_by_unit_only(name, key)) hint = fmt::format("; wrong unit: the expected key is '{}'", name);
+    if (differ_by_unit_only(name, key))
+      hint = fmt::format("; wrong unit: the expected key is '{}'", name);
   }
   if (hint.empty()) {
     const std::string similar = nearest(key, known);
@@ -741,14 +769,16 @@ void TomlTable::finish() const {
   if (hint.empty() && !known.empty() && known.size() <= 24) {
     hint = fmt::format("; known here: {}", fmt::join(known, ", "));
   }
-  document_->fail_at(unknown->key->source().begin,
-                     fmt::format("unknown key '{}' {}{}", shortened(key), unknown->node->in_title(), hint));
+  document_->fail_at(
+      unknown->key->source().begin,
+      fmt::format("unknown key '{}' {}{}", shortened(key), unknown->node->in_title(), hint));
 }
 
 void TomlTable::fail(std::string_view key, const std::string& message) const {
   const toml::key* present = node_->find_key(key);
   const std::string subject = key.empty() ? "" : fmt::format("'{}': ", key);
-  document_->fail_at(present != nullptr ? present->source().begin : node_->place, subject + message);
+  document_->fail_at(present != nullptr ? present->source().begin : node_->place,
+                     subject + message);
 }
 
 std::vector<AskedKey> TomlTable::asked_keys() const {
@@ -757,7 +787,8 @@ std::vector<AskedKey> TomlTable::asked_keys() const {
   const auto fields = [](const AskedKey& key) {
     return std::tie(key.path, key.type, key.range, key.default_value);
   };
-  std::sort(keys.begin(), keys.end(), [&](const auto& a, const auto& b) { return fields(a) < fields(b); });
+  std::sort(keys.begin(), keys.end(),
+            [&](const auto& a, const auto& b) { return fields(a) < fields(b); });
   keys.erase(std::unique(keys.begin(), keys.end(),
                          [&](const auto& a, const auto& b) { return fields(a) == fields(b); }),
              keys.end());

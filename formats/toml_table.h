@@ -1,10 +1,10 @@
 #ifndef HEDDLE_FORMATS_TOML_TABLE_H_
 #define HEDDLE_FORMATS_TOML_TABLE_H_
-// TOML values that know their line. A reader asks for every key it understands, with unit suffix and range;
-// finish() then rejects what nobody asked for. Every error is a ConfigError "file:line:col: what was
-// expected", followed by the source line and a caret. NaN and infinities are never accepted. Every key asked
-// for is recorded (asked_keys), so that a test can hold the documentation against the parser. Tested in
-// tests/formats/toml_table_test.cpp.
+// TOML values that know their line. A reader asks for every key it understands, with unit suffix
+// and range; finish() then rejects what nobody asked for. Every error is a ConfigError
+// "file:line:col: what was expected", followed by the source line and a caret. NaN and infinities
+// are never accepted. Every key asked for is recorded (asked_keys), so that a test can hold the
+// documentation against the parser. Tested in tests/formats/toml_table_test.cpp.
 
 #include <array>
 #include <cstdint>
@@ -25,18 +25,21 @@ struct NumberRange {
   bool exclusive_min = false;
 };
 
-/// One key that a reader asked for, e.g. {"yarn.warp.radius_um", "number", "(0, 1000]", "required"}.
+/// One key that a reader asked for, e.g. {"yarn.warp.radius_um", "number", "(0, 1000]",
+/// "required"}.
 struct AskedKey {
   std::string
-      path;  // dotted; arrays of tables as "light[].axis"; tables listed by table_names() as "fiber.NAME"
-  std::string type;           // number, integer, boolean, string, file, number[2], number[3], number[], table,
-                     // table[]
+      // dotted; arrays of tables as "light[].axis"; tables listed by table_names() as "fiber.NAME"
+      path;
+  // number, integer, boolean, string, file, number[2], number[3], number[], table,
+  std::string type;
+  // table[]
   std::string range;          // "" where none; strings with a fixed set of choices: "face | both"
   std::string default_value;  // "required" where there is none; "optional" for optional_* keys
 };
 
-/// A table of a TOML document. Cheap to copy: tables of one document share it. Not for use by several threads
-/// at once (asking for a key records it).
+/// A table of a TOML document. Cheap to copy: tables of one document share it. Not for use by
+/// several threads at once (asking for a key records it).
 class TomlTable {
  public:
   /// Reads and parses a file. Errors: ConfigError (unreadable file, syntax error with its place).
@@ -73,9 +76,9 @@ class TomlTable {
   /// Names of all sub-tables of this table in file order, e.g. the fibers in [fiber.NAME].
   std::vector<std::string> table_names() const;
 
-  /// Throws for the first key of this table (recursively, in file order) that nobody asked for; names the
-  /// nearest known key if close. Called on the root it covers the whole document, tables never asked for
-  /// included.
+  /// Throws for the first key of this table (recursively, in file order) that nobody asked for;
+  /// names the nearest known key if close. Called on the root it covers the whole document, tables
+  /// never asked for included.
   void finish() const;
 
   /// A ConfigError located at `key` of this table (or at the table itself where the key is absent).
@@ -87,8 +90,8 @@ class TomlTable {
   /// Path of the document as given to load() / parse().
   const std::string& document_name() const;
 
-  /// Canonical text of the whole table (sorted keys, shortest round-trip numbers, no comments): equal
-  /// content, equal text. Used for cache keys.
+  /// Canonical text of the whole table (sorted keys, shortest round-trip numbers, no comments):
+  /// equal content, equal text. Used for cache keys.
   std::string canonical_text() const;
 
  private:

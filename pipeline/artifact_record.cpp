@@ -17,7 +17,8 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
-/// The files of an artifact, by name inside its folder; one without a name where the artifact is a file.
+/// The files of an artifact, by name inside its folder; one without a name where the artifact is a
+/// file.
 using Seals = std::map<std::string, FileSeal>;
 
 Seals seals_of(const fs::path& artifact) {
@@ -31,7 +32,8 @@ Seals seals_of(const fs::path& artifact) {
 
 Json record_json(const Seals& seals, const BuildCost& cost) {
   Json files = Json::object();
-  for (const auto& [name, seal] : seals) files[name] = {{"bytes", seal.bytes}, {"xxh3_128", seal.xxh3_128}};
+  for (const auto& [name, seal] : seals)
+    files[name] = {{"bytes", seal.bytes}, {"xxh3_128", seal.xxh3_128}};
   return {{"files", files},
           {"seconds", cost.time.seconds},
           {"core_seconds", cost.time.core_seconds},
@@ -74,11 +76,13 @@ bool publish_artifact(const fs::path& artifact, const fs::path& record_file,
   const bool built = fs::exists(temporary.path());
   const ArtifactCheck meanwhile = check_artifact(artifact, record_file);
   if (meanwhile.state == ArtifactState::kSound) return built;
-  if (!built) throw FileError(fmt::format("{}: vanished while it was waited for", artifact.string()));
+  if (!built)
+    throw FileError(fmt::format("{}: vanished while it was waited for", artifact.string()));
   std::error_code error;
   if (fs::is_directory(record_file)) fs::remove_all(record_file, error);
   write_sealed_json(record_file, record_json(seals_of(temporary.path()), cost));
-  if (fs::is_directory(artifact) != fs::is_directory(temporary.path())) fs::remove_all(artifact, error);
+  if (fs::is_directory(artifact) != fs::is_directory(temporary.path()))
+    fs::remove_all(artifact, error);
   temporary.commit();
   return true;
 }

@@ -16,7 +16,9 @@ void make_folder(const fs::path& folder) {
   if (folder.empty()) return;
   std::error_code error;
   fs::create_directories(folder, error);
-  if (error) throw FileError(fmt::format("{}: cannot create the folder: {}", folder.string(), error.message()));
+  if (error)
+    throw FileError(
+        fmt::format("{}: cannot create the folder: {}", folder.string(), error.message()));
 }
 
 fs::path default_cache_folder() {
@@ -27,14 +29,16 @@ fs::path default_cache_folder() {
 
 std::string stage_key(const StageInputs& inputs) {
   // Lengths in front of the texts keep ("ab", "c") and ("a", "bc") apart.
-  std::string text = fmt::format("{}:{} version {}\n", inputs.stage.size(), inputs.stage, inputs.version);
+  std::string text =
+      fmt::format("{}:{} version {}\n", inputs.stage.size(), inputs.stage, inputs.version);
   for (const auto& [name, value] : inputs.values) {
     text += fmt::format("{}:{} {}:{}\n", name.size(), name, value.size(), value);
   }
   return content_hash(text);
 }
 
-fs::path Cache::artifact(std::string_view stage, const std::string& key, std::string_view extension) const {
+fs::path Cache::artifact(std::string_view stage, const std::string& key,
+                         std::string_view extension) const {
   return folder_ / stage / (key + std::string(extension));
 }
 

@@ -1,13 +1,16 @@
 #ifndef HEDDLE_PIPELINE_CACHE_H_
 #define HEDDLE_PIPELINE_CACHE_H_
-// The cache of stage artifacts: a folder CACHE/STAGE/ per stage, an artifact named by its key, which is a hash of all
-// that went into it. An artifact appears whole (it is renamed into place), never changes, and is used only where it agrees
-// with its record (artifact_record.h). Several processes may share a cache: those that build the same key write the same
-// bytes.
+// The cache of stage artifacts: a folder CACHE/STAGE/ per stage, an artifact named by its key,
+// which is a hash of all that went into it. An artifact appears whole (it is renamed into place),
+// never changes, and is used only where it agrees with its record (artifact_record.h). Several
+// processes may share a cache: those that build the same key write the same bytes.
 //
 //   CACHE/STAGE/KEY.safetensors (or .vdb, .json, or a folder KEY/)   the artifact
-//   CACHE/STAGE/KEY.record.json                                      its checksum, and what it took to build it
-//   CACHE/STAGE/KEY.partial/FIRST.safetensors, FIRST.record.json     finished chunks of a long stage, kept until it is published
+//   CACHE/STAGE/KEY.record.json                                      its checksum, and what it took
+//                                                                    to build it
+//   CACHE/STAGE/KEY.partial/FIRST.safetensors, FIRST.record.json     finished chunks of a long
+//                                                                    stage, kept until it is
+//                                                                    published
 //
 // Default folder: $HEDDLE_CACHE, else out/cache below the working directory.
 // Errors: FileError with the system's reason. Tested in tests/pipeline/cache_test.cpp.
@@ -29,8 +32,10 @@ void make_folder(const std::filesystem::path& folder);
 /// What a stage's artifact depends on. Order matters; names keep neighbouring values apart.
 struct StageInputs {
   std::string stage;
-  int version = 0;                                          // of the stage's algorithm and file layout
-  std::vector<std::pair<std::string, std::string>> values;  // (name, canonical text or upstream key)
+  // of the stage's algorithm and file layout
+  int version = 0;
+  // (name, canonical text or upstream key)
+  std::vector<std::pair<std::string, std::string>> values;
 };
 
 /// 32 hexadecimal digits.
@@ -42,7 +47,8 @@ class Cache {
 
   const std::filesystem::path& folder() const { return folder_; }
   /// extension with its dot; empty for an artifact that is a folder.
-  std::filesystem::path artifact(std::string_view stage, const std::string& key, std::string_view extension) const;
+  std::filesystem::path artifact(std::string_view stage, const std::string& key,
+                                 std::string_view extension) const;
 
   std::filesystem::path record(std::string_view stage, const std::string& key) const;
 

@@ -30,12 +30,13 @@ using Json = nlohmann::ordered_json;
 // A chart takes an hour, not a night, on two cores with pictures of this width.
 constexpr int kDefaultWidth = 96;
 
-// Shorter renderings are repeated, up to kRepeats times in all, and the shortest time counts: what disturbs a measurement
-// makes it longer.
+// Shorter renderings are repeated, up to kRepeats times in all, and the shortest time counts: what
+// disturbs a measurement makes it longer.
 constexpr double kLongEnough = 1.0;  // s
 constexpr int kRepeats = 3;
 
-// Blocks of pixels for the intervals: enough of them that 1.96 standard errors are 95 %, no larger than what neighbours share.
+// Blocks of pixels for the intervals: enough of them that 1.96 standard errors are 95 %, no larger
+// than what neighbours share.
 constexpr int kBlocks = 48;
 constexpr int kLargestBlock = 8;
 
@@ -57,7 +58,10 @@ struct Picture {
 class ChartMaker {
  public:
   ChartMaker(const ChartOptions& options, StageContext& context, fs::path runs)
-      : options_(&options), context_(&context), runs_(std::move(runs)), processor_(processor_name()) {
+      : options_(&options),
+        context_(&context),
+        runs_(std::move(runs)),
+        processor_(processor_name()) {
     make_folder(runs_);
     require_writable(runs_ / "picture.exr");  // before hours of work
     require_writable(options.output / "chart.csv");
@@ -77,13 +81,14 @@ class ChartMaker {
   }
 
   Chart make() {
-    const std::vector<ChartRun> runs =
-        chart_runs(job_->config(), base_, {.quick = options_->quick, .spp = options_->quick ? 4 : 64});
+    const std::vector<ChartRun> runs = chart_runs(
+        job_->config(), base_, {.quick = options_->quick, .spp = options_->quick ? 4 : 64});
     for (const ReferenceKind kind : kReferenceKinds) make_reference(kind);
     const std::vector<std::string>& wanted = options_->methods;
     for (const ChartRun& run : runs) {
       const char* method = render_method_name(run.request.method);
-      if (!wanted.empty() && std::find(wanted.begin(), wanted.end(), method) == wanted.end()) continue;
+      if (!wanted.empty() && std::find(wanted.begin(), wanted.end(), method) == wanted.end())
+        continue;
       stop_if_interrupted();
       chart_.rows.push_back(make_row(run));
       say(chart_.rows.back());
@@ -96,8 +101,12 @@ class ChartMaker {
   /// The camera of the chart's pictures, and the part of its frame that they show.
   PixelRect choose_frame(CameraConfig& camera) const {
     const double aspect = static_cast<double>(camera.height) / camera.width;
-    const auto height_of = [aspect](int width) { return std::max(1, static_cast<int>(std::lround(width * aspect))); };
-    const auto width_of = [aspect](int height) { return std::max(1, static_cast<int>(std::lround(height / aspect))); };
+    const auto height_of = [aspect](int width) {
+      return std::max(1, static_cast<int>(std::lround(width * aspect)));
+    };
+    const auto width_of = [aspect](int height) {
+      return std::max(1, static_cast<int>(std::lround(height / aspect)));
+    };
     if (options_->width || options_->height) {
       const int width = options_->width.value_or(width_of(options_->height.value_or(0)));
       camera.height = options_->height.value_or(height_of(width));
@@ -106,9 +115,10 @@ class ChartMaker {
       camera.height = height_of(kDefaultWidth);
       camera.width = kDefaultWidth;
     }
-    const PixelRect crop =
-        options_->crop.empty() ? PixelRect{0, 0, camera.width, camera.height} : parse_crop(options_->crop, camera);
-    if (crop.width * crop.height < 4) throw ConfigError("chart: expected a picture of at least 4 pixels");
+    const PixelRect crop = options_->crop.empty() ? PixelRect{0, 0, camera.width, camera.height}
+                                                  : parse_crop(options_->crop, camera);
+    if (crop.width * crop.height < 4)
+      throw ConfigError("chart: expected a picture of at least 4 pixels");
     return crop;
   }
 
@@ -122,20 +132,23 @@ class ChartMaker {
   fs::path file(const std::string& name) const { return runs_ / name; }
   static fs::path in_folder(const std::string& name) { return fs::path("runs") / name; }
 
-  /// What an earlier chart noted of a picture, if this one may count on it: the same program on the same machine.
+  /// What an earlier chart noted of a picture, if this one may count on it: the same program on the
+  /// same machine.
   std::optional<Json> earlier_record(const std::string& key) const {
     const fs::path record_file = file(key + ".json");
     const bool may = options_->resume || made_.contains(key);
     if (!may || !fs::exists(record_file)) return {};
     try {
       Json record = read_sealed_json(record_file);
-      const bool same_machine = record.at("threads") == working_threads() && record.at("processor") == processor_ &&
+      const bool same_machine = record.at("threads") == working_threads() &&
+                                record.at("processor") == processor_ &&
                                 record.at("program_version") == kProgramVersion;
       if (!same_machine) return {};
       const Json& picture = record.at("picture");
-      verify_seal(file(key + ".exr"),
-                  {picture.at("bytes").get<std::uint64_t>(), picture.at("xxh3_128").get<std::string>()},
-                  record_file.filename().string());
+      verify_seal(
+          file(key + ".exr"),
+          {picture.at("bytes").get<std::uint64_t>(), picture.at("xxh3_128").get<std::string>()},
+          record_file.filename().string());
       return record;
     } catch (const FileError& error) {
       context_->console->warn(fmt::format("{}; rendered again", error.what()));
@@ -144,7 +157,8 @@ class ChartMaker {
   }
 
   /// Renders a picture, or finds it; returns its record, which is written last.
-  Json provide(const PictureRequest& request, const std::string& key, const std::string& title, bool repeat) {
+  Json provide(const PictureRequest& request, const std::string& key, const std::string& title,
+               bool repeat) {
     if (std::optional<Json> record = earlier_record(key)) return *record;
     WorkTime best;
     WorkTime spent;
@@ -182,8 +196,8 @@ class ChartMaker {
     // Not the runs' own random numbers: errors would look smaller than they are.
     reference.request.seed = base_.seed + 1;
     reference.key = job_->picture_key(reference.request);
-    const Json record =
-        provide(reference.request, reference.key, fmt::format("{} reference", reference_name(kind)), false);
+    const Json record = provide(reference.request, reference.key,
+                                fmt::format("{} reference", reference_name(kind)), false);
     reference.seconds = record.at("render_seconds").get<double>();
     reference.core_seconds = record.at("render_core_seconds").get<double>();
     reference.picture = in_folder(reference.key + ".png");
@@ -192,10 +206,11 @@ class ChartMaker {
     picture = {layer_of(image, "", reference.key), layer_of(image, "half0", reference.key),
                layer_of(image, "half1", reference.key)};
     reference.noise = reference_noise({picture.half0, picture.half1});
-    reference.flip_between_halves = flip_error(picture.half0, picture.half1, chart_.crop.width, chart_.crop.height);
-    context_->console->say(fmt::format("{} reference: {} spp in {}, noise {:.2f} %", reference_name(kind),
-                                       reference.request.spp, duration_text(reference.seconds),
-                                       100 * reference.noise.rms));
+    reference.flip_between_halves =
+        flip_error(picture.half0, picture.half1, chart_.crop.width, chart_.crop.height);
+    context_->console->say(fmt::format(
+        "{} reference: {} spp in {}, noise {:.2f} %", reference_name(kind), reference.request.spp,
+        duration_text(reference.seconds), 100 * reference.noise.rms));
   }
 
   ChartRow make_row(const ChartRun& run) {
@@ -208,7 +223,8 @@ class ChartMaker {
       row.stages = job_->precompute_costs(run.request);
       add_precompute(row);
       row.key = job_->picture_key(run.request);
-      const Json record = provide(run.request, row.key, fmt::format("{}, {}", run.method, run.label), true);
+      const Json record =
+          provide(run.request, row.key, fmt::format("{}, {}", run.method, run.label), true);
       row.render_seconds = record.at("render_seconds").get<double>();
       row.render_core_seconds = record.at("render_core_seconds").get<double>();
       row.picture = in_folder(row.key + ".png");
@@ -241,17 +257,20 @@ class ChartMaker {
     const Picture& expected = expected_[k];
     const int width = chart_.crop.width;
     const int height = chart_.crop.height;
-    const int edge = std::clamp(static_cast<int>(std::sqrt(width * height / kBlocks)), 1, kLargestBlock);
+    const int edge =
+        std::clamp(static_cast<int>(std::sqrt(width * height / kBlocks)), 1, kLargestBlock);
     const auto is_finite = [](const Rgb& color) { return color.isFinite().all(); };
     if (!std::all_of(colors.begin(), colors.end(), is_finite))
       throw std::runtime_error("the picture holds NaN or infinity");
-    row.error[k].estimate = estimate_error(colors, {expected.half0, expected.half1}, width, height, edge);
+    row.error[k].estimate =
+        estimate_error(colors, {expected.half0, expected.half1}, width, height, edge);
     row.error[k].flip = flip_error(colors, expected.colors, width, height);
     double mean = 0;
     for (const Rgb& color : expected.colors) mean += static_cast<double>(color.mean());
     mean /= static_cast<double>(expected.colors.size());
     const std::string name = fmt::format("{}-{}.png", row.key, reference_name(kind));
-    write_png(file(name), width, height, difference_picture(colors, expected.colors, mean > 0 ? mean : 1));
+    write_png(file(name), width, height,
+              difference_picture(colors, expected.colors, mean > 0 ? mean : 1));
     row.difference[k] = in_folder(name);
   }
 
@@ -262,13 +281,13 @@ class ChartMaker {
       return;
     }
     if (!row.precompute_seconds) {
-      context_->console->warn(
-          fmt::format("{}: the cache does not say how long its data took; total time left out", name));
+      context_->console->warn(fmt::format(
+          "{}: the cache does not say how long its data took; total time left out", name));
     }
     const PictureErrorEstimate& estimate = row.error[0].estimate;
-    context_->console->say(fmt::format("{}: {:.3g} s, relative RMSE {:.2f} % ({:.2f} to {:.2f})", name,
-                                       row.render_seconds, 100 * estimate.relative_rmse, 100 * estimate.rmse_low,
-                                       100 * estimate.rmse_high));
+    context_->console->say(fmt::format("{}: {:.3g} s, relative RMSE {:.2f} % ({:.2f} to {:.2f})",
+                                       name, row.render_seconds, 100 * estimate.relative_rmse,
+                                       100 * estimate.rmse_low, 100 * estimate.rmse_high));
   }
 
   const ChartOptions* options_;
@@ -302,7 +321,10 @@ int chart_command(const ChartOptions& options, const CommonOptions& common) {
   write("chart-local.svg", chart_svg(chart, ReferenceKind::kLocal));
   write("index.html", chart_html(chart, options.output));
   job.finish();
-  return std::any_of(chart.rows.begin(), chart.rows.end(), [](const ChartRow& row) { return row.done(); }) ? 0 : 1;
+  return std::any_of(chart.rows.begin(), chart.rows.end(),
+                     [](const ChartRow& row) { return row.done(); })
+             ? 0
+             : 1;
 }
 
 }  // namespace heddle

@@ -21,7 +21,8 @@ Image read_comparable(const std::filesystem::path& path) {
 int compare_command(const CompareOptions& options, const CommonOptions& common) {
   const Image a = read_comparable(options.a);
   const Image b = read_comparable(options.b);
-  const PictureComparison comparison = compare_images(a, options.a.string(), b, options.b.string(), options.layer);
+  const PictureComparison comparison =
+      compare_images(a, options.a.string(), b, options.b.string(), options.layer);
   if (options.output) write_difference(*options.output, comparison);
   if (common.json) {
     std::cout << comparison_report(comparison).dump(2) << '\n';
@@ -30,7 +31,8 @@ int compare_command(const CompareOptions& options, const CommonOptions& common) 
   }
   const PictureError& error = comparison.error;
   const bool rmse_beyond = options.max_rmse && error.relative_rmse > *options.max_rmse;
-  const bool mean_beyond = options.max_mean && error.relative_difference.abs().maxCoeff() > *options.max_mean;
+  const bool mean_beyond =
+      options.max_mean && error.relative_difference.abs().maxCoeff() > *options.max_mean;
   return rmse_beyond || mean_beyond ? 1 : 0;
 }
 

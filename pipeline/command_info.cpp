@@ -52,7 +52,9 @@ void describe_exemplar(const Exemplar& exemplar, std::uint64_t seed, Report& rep
 
 Report describe_fabric(const fs::path& path, const CommonOptions& common) {
   const FabricDocument fabric = read_fabric_document(path, common.seed);
-  Report report = {{"kind", "fabric config"}, {"name", fabric.config.name}, {"weave", fabric.config.weave.notation}};
+  Report report = {{"kind", "fabric config"},
+                   {"name", fabric.config.name},
+                   {"weave", fabric.config.weave.notation}};
   report["light_from"] = fabric.config.light_from_both_sides ? "both" : "face";
   report["seed"] = fabric.config.seed;
   describe_exemplar(synthesize(fabric.config), fabric.config.seed, report);
@@ -69,13 +71,14 @@ Report describe_scene(const TomlTable& document) {
   Report report = {{"kind", "scene config"}, {"name", scene.name}};
   for (const ViewConfig& view : scene.views) {
     report["view." + (view.name.empty() ? std::string("camera") : view.name)] =
-        fmt::format("{} x {} pixels, {} samples per pixel{}", view.camera.width, view.camera.height, view.spp,
-                    view.reference ? ", with a path-traced reference" : "");
+        fmt::format("{} x {} pixels, {} samples per pixel{}", view.camera.width, view.camera.height,
+                    view.spp, view.reference ? ", with a path-traced reference" : "");
   }
   report["method"] = render_method_name(scene.method);
   report["lights"] = scene.lights.size();
   Report fabrics = Report::array();
-  for (const ClothConfig& cloth : scene.cloths) fabrics.push_back(cloth.surface ? cloth.surface->name : cloth.fabric.string());
+  for (const ClothConfig& cloth : scene.cloths)
+    fabrics.push_back(cloth.surface ? cloth.surface->name : cloth.fabric.string());
   report["fabrics"] = fabrics;
   return report;
 }
@@ -107,7 +110,8 @@ Report describe_tensors(const fs::path& path, const CommonOptions& common) {
   Report report = {{"kind", "tensor file"}};
   for (const auto& [key, value] : file.metadata()) report["metadata." + key] = value;
   for (const auto& [name, entry] : file.entries()) {
-    report["tensor." + name] = fmt::format("{} [{}]", type_name(entry.type), fmt::join(entry.shape, "]["));
+    report["tensor." + name] =
+        fmt::format("{} [{}]", type_name(entry.type), fmt::join(entry.shape, "]["));
   }
   const auto kind = file.metadata().find("kind");
   if (kind != file.metadata().end() && kind->second == "fibers") {
@@ -139,26 +143,30 @@ Report describe_pack(const fs::path& folder) {
   for (const char* name : {"fibers.safetensors", "ssdf.safetensors", "sg.safetensors"}) {
     if (manifest.files.contains(name)) segment_bytes += bytes_without_basis(folder / name);
   }
-  report["bytes_per_segment"] =
-      rounded(static_cast<double>(segment_bytes) / static_cast<double>(pack.exemplar.segment_count()));
+  report["bytes_per_segment"] = rounded(static_cast<double>(segment_bytes) /
+                                        static_cast<double>(pack.exemplar.segment_count()));
   if (pack.transfer) {
     report["transfer_order"] = pack.transfer->order;
     report["cells"] = pack.transfer->cell_count();
-    report["bytes_per_cell"] = rounded(static_cast<double>(manifest.files.at("transfer.safetensors").bytes) /
-                                       static_cast<double>(pack.transfer->cell_count()));
+    report["bytes_per_cell"] =
+        rounded(static_cast<double>(manifest.files.at("transfer.safetensors").bytes) /
+                static_cast<double>(pack.transfer->cell_count()));
   }
   return report;
 }
 
 void describe_volume(const IdVolume& volume, Report& report) {
-  const auto filled = std::count_if(volume.ids.begin(), volume.ids.end(), [](std::int32_t id) { return id >= 0; });
+  const auto filled =
+      std::count_if(volume.ids.begin(), volume.ids.end(), [](std::int32_t id) { return id >= 0; });
   report["kind"] = "segment-id volume";
   report["voxels"] = fmt::format("{} x {} x {}", volume.size[0], volume.size[1], volume.size[2]);
   report["voxel_um"] = {rounded(1e3 * volume.voxel_mm[0]), rounded(1e3 * volume.voxel_mm[1]),
                         rounded(1e3 * volume.voxel_mm[2])};
-  report["origin_mm"] = {rounded(volume.origin_mm[0]), rounded(volume.origin_mm[1]), rounded(volume.origin_mm[2])};
+  report["origin_mm"] = {rounded(volume.origin_mm[0]), rounded(volume.origin_mm[1]),
+                         rounded(volume.origin_mm[2])};
   report["filled_share"] =
-      rounded(static_cast<double>(filled) / static_cast<double>(std::max<std::size_t>(volume.ids.size(), 1)));
+      rounded(static_cast<double>(filled) /
+              static_cast<double>(std::max<std::size_t>(volume.ids.size(), 1)));
 }
 
 Report describe_vdb(const fs::path& path) {
@@ -192,8 +200,9 @@ Report describe_image(const fs::path& path) {
     }
     const double count = static_cast<double>(channel.values.size() - not_finite);
     report["channel." + name] = fmt::format(
-        "{}  mean {:.6g}  min {:.6g}  max {:.6g}{}", channel.type == ChannelType::kHalf ? "HALF" : "FLOAT",
-        sum / std::max(count, 1.0), low, high, not_finite > 0 ? fmt::format("  {} values not finite", not_finite) : "");
+        "{}  mean {:.6g}  min {:.6g}  max {:.6g}{}",
+        channel.type == ChannelType::kHalf ? "HALF" : "FLOAT", sum / std::max(count, 1.0), low,
+        high, not_finite > 0 ? fmt::format("  {} values not finite", not_finite) : "");
   }
   return report;
 }
@@ -209,7 +218,8 @@ Report describe_mesh(const fs::path& path) {
       high[axis] = v == 0 ? x : std::max(high[axis], x);
     }
   }
-  Report report = {{"kind", "mesh"}, {"vertices", mesh.positions.size()}, {"triangles", mesh.triangles.size()}};
+  Report report = {
+      {"kind", "mesh"}, {"vertices", mesh.positions.size()}, {"triangles", mesh.triangles.size()}};
   report["has_uv"] = !mesh.uvs.empty();
   report["has_normals"] = !mesh.normals.empty();
   report["box_min"] = {rounded(low[0]), rounded(low[1]), rounded(low[2])};
@@ -233,7 +243,8 @@ Report describe(const fs::path& path, const CommonOptions& common) {
   if (extension == ".exr") return describe_image(path);
   if (extension == ".obj") return describe_mesh(path);
   throw FileError(path.string() +
-                  ": expected a pack, or a file that ends in .toml, .safetensors, .vdb, .exr or .obj, or the .json of "
+                  ": expected a pack, or a file that ends in .toml, .safetensors, .vdb, .exr or "
+                  ".obj, or the .json of "
                   "an accuracy table");
 }
 

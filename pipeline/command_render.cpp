@@ -26,13 +26,16 @@ void apply_overrides(const RenderOptions& options, PictureRequest& request) {
   if (!path && (options.seconds || options.local || !options.estimator.empty())) {
     throw ConfigError("--seconds, --local and --estimator belong to --method path or path-6");
   }
-  if (request.method != RenderMethod::kPath && options.bounces) throw ConfigError("--bounces belongs to --method path");
+  if (request.method != RenderMethod::kPath && options.bounces)
+    throw ConfigError("--bounces belongs to --method path");
   if (path && request.spp % 2 != 0)
-    throw ConfigError("--spp: expected an even number where paths are traced: they keep two halves");
-  static const std::map<std::string, LightEstimator> estimators = {{"", LightEstimator::kCombined},
-                                                                   {"mis", LightEstimator::kCombined},
-                                                                   {"light", LightEstimator::kShadowRays},
-                                                                   {"bcsdf", LightEstimator::kEscapes}};
+    throw ConfigError(
+        "--spp: expected an even number where paths are traced: they keep two halves");
+  static const std::map<std::string, LightEstimator> estimators = {
+      {"", LightEstimator::kCombined},
+      {"mis", LightEstimator::kCombined},
+      {"light", LightEstimator::kShadowRays},
+      {"bcsdf", LightEstimator::kEscapes}};
   request.seconds = options.seconds;
   request.local = options.local;
   request.bounces = options.bounces;
@@ -45,7 +48,8 @@ void write_picture(const PictureResult& picture, const std::filesystem::path& ou
   job.add_artifact(output);
 }
 
-/// Variance of one sample of a pixel as the picture itself shows it, relative to the squared mean radiance.
+/// Variance of one sample of a pixel as the picture itself shows it, relative to the squared mean
+/// radiance.
 Estimate relative_noise_of(const FrameBuffers& frame) {
   const double mean = mean_radiance(std::span(&frame, 1));
   const Estimate variance = sample_variance_of_all(frame);
@@ -55,11 +59,12 @@ Estimate relative_noise_of(const FrameBuffers& frame) {
 
 /// The cheapest picture that is good enough.
 int render_within(double tolerance, const RenderOptions& options, Job& job) {
-  const bool by_hand = !options.method.empty() || options.spp || options.seconds || options.local || options.bounces ||
-                       options.order || !options.estimator.empty();
+  const bool by_hand = !options.method.empty() || options.spp || options.seconds || options.local ||
+                       options.bounces || options.order || !options.estimator.empty();
   if (by_hand) {
     throw ConfigError(
-        "--tolerance chooses method, samples and data: not together with --method, --spp, --seconds, --local, "
+        "--tolerance chooses method, samples and data: not together with --method, --spp, "
+        "--seconds, --local, "
         "--bounces, --estimator or --order");
   }
   const ScenePlan plan = make_plan({.scene = options.scene,
@@ -88,9 +93,11 @@ int render_within(double tolerance, const RenderOptions& options, Job& job) {
   PictureResult picture = scene.render(request, "render");
   const double noise = std::sqrt(noise_square.value / spp);
   const double error = std::hypot(std::sqrt(std::max(0.0, way.candidate.bias_square.value)), noise);
-  const std::string done =
-      fmt::format("{}, {} spp in {:.3g} s: expected error {:.3g} %, of that noise {:.3g} %, as the picture shows",
-                  way.candidate.name, spp, picture.report.at("seconds").get<double>(), 100 * error, 100 * noise);
+  const std::string done = fmt::format(
+      "{}, {} spp in {:.3g} s: expected error {:.3g} %, of that noise {:.3g} %, as the picture "
+      "shows",
+      way.candidate.name, spp, picture.report.at("seconds").get<double>(), 100 * error,
+      100 * noise);
   if (error > tolerance) {
     job.console().warn(done + fmt::format("; more than the {:.3g} % asked for", 100 * tolerance));
   } else {
@@ -108,7 +115,8 @@ int render_within(double tolerance, const RenderOptions& options, Job& job) {
 }  // namespace
 
 int render_command(const RenderOptions& options, const CommonOptions& common) {
-  if (options.output.extension() != ".exr") throw ConfigError("-o: expected a file name that ends in .exr");
+  if (options.output.extension() != ".exr")
+    throw ConfigError("-o: expected a file name that ends in .exr");
   Job job(common);
   // Hours of work later would be late to find out.
   make_folder(options.output.parent_path());
@@ -116,7 +124,8 @@ int render_command(const RenderOptions& options, const CommonOptions& common) {
     require_writable(std::filesystem::path(options.output).replace_extension(extension));
   }
   if (options.tolerance) return render_within(*options.tolerance, options, job);
-  SceneJob scene(options.scene, job.context(), {.order = options.order, .fabric = {}, .blend = {}, .surface_method = {}});
+  SceneJob scene(options.scene, job.context(),
+                 {.order = options.order, .fabric = {}, .blend = {}, .surface_method = {}});
   PictureRequest request = scene.request(find_view(scene.config(), options.view));
   apply_overrides(options, request);
   write_picture(scene.render(request, "render"), options.output, job);

@@ -13,8 +13,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A picture from the cache, rendered where it is not there, and copied to `target` (with its .png and .json).
-void provide_picture(SceneJob& scene, const PictureRequest& request, const fs::path& target, Job& job) {
+/// A picture from the cache, rendered where it is not there, and copied to `target` (with its .png
+/// and .json).
+void provide_picture(SceneJob& scene, const PictureRequest& request, const fs::path& target,
+                     Job& job) {
   const std::string title = target.stem().string();
   StageContext& context = job.context();
   Stage stage;
@@ -22,16 +24,18 @@ void provide_picture(SceneJob& scene, const PictureRequest& request, const fs::p
   stage.key = scene.picture_key(request);
   const fs::path folder = context.cache.artifact(stage.name, stage.key, "");
   const fs::path cached = folder / "picture.exr";
-  StageResult result{.fabric = scene.config().name, .stage = title, .key = stage.key, .artifact = cached};
+  StageResult result{
+      .fabric = scene.config().name, .stage = title, .key = stage.key, .artifact = cached};
   if (!is_sound(stage, context)) {
     const Stopwatch watch;
-    publish_artifact(folder, context.cache.record(stage.name, stage.key), [&](const fs::path& temporary) {
-      const PictureResult picture = scene.render(request, title);
-      make_folder(temporary);
-      write_exr(temporary / cached.filename(), picture.image);
-      write_picture_report(temporary / cached.filename(), picture);
-      return BuildCost{watch.elapsed(), working_threads()};
-    });
+    publish_artifact(folder, context.cache.record(stage.name, stage.key),
+                     [&](const fs::path& temporary) {
+                       const PictureResult picture = scene.render(request, title);
+                       make_folder(temporary);
+                       write_exr(temporary / cached.filename(), picture.image);
+                       write_picture_report(temporary / cached.filename(), picture);
+                       return BuildCost{watch.elapsed(), working_threads()};
+                     });
     result.built = true;
     result.seconds = watch.elapsed().seconds;
   } else {
@@ -72,8 +76,10 @@ Image cropped(const Image& full, const PixelRect& crop) {
 
 int run_command(const RunOptions& options, const CommonOptions& common) {
   Job job(common);
-  SceneJob scene(options.scene, job.context(), {.order = options.order, .fabric = {}, .blend = {}, .surface_method = {}});
-  const fs::path folder = options.output.empty() ? fs::path("out") / options.scene.stem() : options.output;
+  SceneJob scene(options.scene, job.context(),
+                 {.order = options.order, .fabric = {}, .blend = {}, .surface_method = {}});
+  const fs::path folder =
+      options.output.empty() ? fs::path("out") / options.scene.stem() : options.output;
   make_folder(folder);
   require_writable(folder / (options.scene.stem().string() + ".exr"));  // before hours of work
 
@@ -86,9 +92,9 @@ int run_command(const RunOptions& options, const CommonOptions& common) {
     provide_picture(scene, scene.reference_request(view), reference, job);
 
     const fs::path difference = folder / (name + "-difference.exr");
-    const PictureComparison comparison =
-        compare_images(cropped(read_exr(picture), view.reference->crop), picture.filename().string(),
-                       read_exr(reference), reference.filename().string(), "");
+    const PictureComparison comparison = compare_images(
+        cropped(read_exr(picture), view.reference->crop), picture.filename().string(),
+        read_exr(reference), reference.filename().string(), "");
     write_difference(difference, comparison);
     write_file_atomically(fs::path(difference).replace_extension(".json"),
                           comparison_report(comparison).dump(2) + "\n");

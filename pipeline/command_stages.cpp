@@ -9,14 +9,16 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// FileError where a pack may not take this place. Packs may be replaced, whole or cut short, but nothing else is lost.
+/// FileError where a pack may not take this place. Packs may be replaced, whole or cut short, but
+/// nothing else is lost.
 void require_pack_or_nothing(const fs::path& place) {
   if (!fs::exists(place)) return;
   if (!fs::is_directory(place)) throw FileError(place.string() + ": exists and is not a folder");
   for (const auto& entry : fs::directory_iterator(place)) {
     if (is_pack_file(entry.path().filename().native())) continue;
     throw FileError(entry.path().string() +
-                    ": is no part of a pack, and would be lost with its folder; remove it or choose another name");
+                    ": is no part of a pack, and would be lost with its folder; remove it or "
+                    "choose another name");
   }
 }
 

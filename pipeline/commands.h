@@ -1,8 +1,9 @@
 #ifndef HEDDLE_PIPELINE_COMMANDS_H_
 #define HEDDLE_PIPELINE_COMMANDS_H_
-// What the subcommands do, apart from the parsing of their options (main.cpp). Each returns the exit status: 0 done,
-// 1 beyond a limit that was asked for. Failures are exceptions: ConfigError (2), FileError (1), Interrupted (128 + signal).
-// Data goes to standard output, messages and progress to standard error. Tested in tests/pipeline/end_to_end_test.cpp.
+// What the subcommands do, apart from the parsing of their options (main.cpp). Each returns the
+// exit status: 0 done, 1 beyond a limit that was asked for. Failures are exceptions: ConfigError
+// (2), FileError (1), Interrupted (128 + signal). Data goes to standard output, messages and
+// progress to standard error. Tested in tests/pipeline/end_to_end_test.cpp.
 
 #include <cstdint>
 #include <filesystem>
@@ -38,8 +39,9 @@ struct RunOptions {
   std::filesystem::path output;  // folder; out/SCENE where empty
   std::optional<int> order;
 };
-/// For every view of the scene, in `output`: NAME.exr, NAME.png and NAME.json, and where the view asks for a reference
-/// NAME.reference.* (path-traced) and NAME.difference.* of a crop. Pictures are cached like artifacts of stages.
+/// For every view of the scene, in `output`: NAME.exr, NAME.png and NAME.json, and where the view
+/// asks for a reference NAME.reference.* (path-traced) and NAME.difference.* of a crop. Pictures
+/// are cached like artifacts of stages.
 int run_command(const RunOptions& options, const CommonOptions& common);
 
 struct RenderOptions {
@@ -67,8 +69,9 @@ struct PlanOptions {
   double tolerance = 0;  // relative RMSE
   int pictures = 1;
 };
-/// Prints what would be built and used, what it costs and why (docs/plan.md). Builds accuracy tables where they are missing and
-/// path tracing is not cheaper than that. Status 1 where no way meets the tolerance.
+/// Prints what would be built and used, what it costs and why (docs/plan.md). Builds accuracy
+/// tables where they are missing and path tracing is not cheaper than that. Status 1 where no way
+/// meets the tolerance.
 int plan_command(const PlanOptions& options, const CommonOptions& common);
 
 struct CompareOptions {
@@ -86,16 +89,19 @@ struct ChartOptions {
   std::filesystem::path scene;
   std::filesystem::path output;  // folder
   std::string view;              // the scene's first where empty
-  std::optional<int> width;      // px; 96 or less where neither is given, the other by the view's shape
+  // px; 96 or less where neither is given, the other by the view's shape
+  std::optional<int> width;
   std::optional<int> height;
-  std::vector<int> crop;  // x0, y0, x1, y1, or empty; of the view's own frame where no width or height is given
+  // x0, y0, x1, y1, or empty; of the view's own frame where no width or height is given
+  std::vector<int> crop;
   std::vector<std::string> methods;  // of the runs; all where empty
   int reference_spp = 1024;
   bool quick = false;
   bool resume = false;
 };
-/// Speed against accuracy, over the methods and their settings: chart.csv, chart.json, chart.svg, chart-local.svg,
-/// index.html and runs/ in `output` (docs/chart.md). Status 1 where every run failed.
+/// Speed against accuracy, over the methods and their settings: chart.csv, chart.json, chart.svg,
+/// chart-local.svg, index.html and runs/ in `output` (docs/chart.md). Status 1 where every run
+/// failed.
 int chart_command(const ChartOptions& options, const CommonOptions& common);
 
 /// Prints what a file holds.

@@ -47,7 +47,8 @@ void announce_memory(Console& console, const std::string& work, std::uint64_t by
   require_memory(bytes, work);
 }
 
-Progress::Progress(Console& console, std::string title, std::string unit, std::uint64_t total, std::uint64_t done)
+Progress::Progress(Console& console, std::string title, std::string unit, std::uint64_t total,
+                   std::uint64_t done)
     : console_(&console),
       title_(std::move(title)),
       unit_(std::move(unit)),
@@ -87,10 +88,11 @@ void Progress::advance(std::uint64_t items) {
 
 std::string Progress::line(double elapsed_seconds) const {
   const double rate = static_cast<double>(done_ - first_) / std::max(elapsed_seconds, 1e-9);
-  const std::string rate_text = rate >= 10 ? fmt::format("{:.0f}", rate) : fmt::format("{:.2g}", rate);
-  std::string text =
-      fmt::format("{:<10} {:3} %  {}/{} {}  {} {}/s", title_, 100 * done_ / std::max<std::uint64_t>(total_, 1), done_,
-                  total_, unit_, rate_text, unit_);
+  const std::string rate_text =
+      rate >= 10 ? fmt::format("{:.0f}", rate) : fmt::format("{:.2g}", rate);
+  std::string text = fmt::format("{:<10} {:3} %  {}/{} {}  {} {}/s", title_,
+                                 100 * done_ / std::max<std::uint64_t>(total_, 1), done_, total_,
+                                 unit_, rate_text, unit_);
   if (rate > 0 && done_ < total_) {
     text += fmt::format("  {} left", duration_text(static_cast<double>(total_ - done_) / rate));
   }

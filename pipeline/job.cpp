@@ -11,7 +11,10 @@ Job::Job(const CommonOptions& options)
     : json_(options.json),
       start_(std::chrono::steady_clock::now()),
       console_(std::cerr, ::isatty(STDERR_FILENO) == 1, options.quiet),
-      context_{.cache = Cache(options.cache), .console = &console_, .seed = options.seed, .results = {}} {}
+      context_{.cache = Cache(options.cache),
+               .console = &console_,
+               .seed = options.seed,
+               .results = {}} {}
 
 void Job::finish() const {
   if (!json_) {
@@ -31,8 +34,10 @@ void Job::finish() const {
   }
   auto artifacts = nlohmann::ordered_json::array();
   for (const std::filesystem::path& path : artifacts_) artifacts.push_back(path.string());
-  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
-  nlohmann::ordered_json report = {{"stages", stages}, {"artifacts", artifacts}, {"seconds", seconds}};
+  const double seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+  nlohmann::ordered_json report = {
+      {"stages", stages}, {"artifacts", artifacts}, {"seconds", seconds}};
   for (const auto& [name, value] : entries_) report[name] = value;
   std::cout << report.dump(2) << '\n';
 }

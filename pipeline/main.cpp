@@ -1,4 +1,5 @@
-// The program `heddle`: its subcommands, their options, and what an error becomes (message on standard error, exit status).
+// The program `heddle`: its subcommands, their options, and what an error becomes (message on
+// standard error, exit status).
 
 #include <tbb/global_control.h>
 
@@ -42,13 +43,14 @@ Shard parse_shard(const std::string& text) {
     const char* end = text.data() + text.size();
     const auto index = std::from_chars(text.data(), middle, shard.index);
     const auto count = std::from_chars(middle + 1, end, shard.count);
-    if (index.ec == std::errc{} && index.ptr == middle && count.ec == std::errc{} && count.ptr == end &&
-        shard.index >= 1 && shard.index <= shard.count) {
+    if (index.ec == std::errc{} && index.ptr == middle && count.ec == std::errc{} &&
+        count.ptr == end && shard.index >= 1 && shard.index <= shard.count) {
       --shard.index;
       return shard;
     }
   }
-  throw ConfigError("--shard: expected i/n with 1 <= i <= n, for example 1/4; got \"" + text + "\"");
+  throw ConfigError("--shard: expected i/n with 1 <= i <= n, for example 1/4; got \"" + text +
+                    "\"");
 }
 
 /// The options of all subcommands; each subcommand offers those that mean something to it.
@@ -85,41 +87,47 @@ void add_order(CLI::App& command, std::optional<int>& order) {
 }
 
 template <class Tolerance>
-CLI::Option* add_tolerance(CLI::App& command, int& pictures, const std::string& help, Tolerance& tolerance) {
+CLI::Option* add_tolerance(CLI::App& command, int& pictures, const std::string& help,
+                           Tolerance& tolerance) {
   command
-      .add_option("--pictures", pictures,
-                  "With --tolerance: pictures that share the data, frames of a shot; 1 where absent")
+      .add_option(
+          "--pictures", pictures,
+          "With --tolerance: pictures that share the data, frames of a shot; 1 where absent")
       ->check(CLI::Range(1, 1 << 20));
   return command.add_option("--tolerance", tolerance, help)->check(CLI::Range(1e-6, 100.0));
 }
 
-void add_stage_command(CLI::App& app, Options& options, const std::string& name, const std::string& help,
-                       StageTarget target, bool with_shard) {
+void add_stage_command(CLI::App& app, Options& options, const std::string& name,
+                       const std::string& help, StageTarget target, bool with_shard) {
   CLI::App* command = app.add_subcommand(name, help);
   add_building(*command, options);
   command->add_option("FABRIC.toml", options.stage.fabric, "Fabric config")->required();
-  if (target == StageTarget::kTransfer || target == StageTarget::kPack) add_order(*command, options.stage.order);
+  if (target == StageTarget::kTransfer || target == StageTarget::kPack)
+    add_order(*command, options.stage.order);
   if (target == StageTarget::kPack) {
     command->add_option("-o,--output,--outfile", options.stage.output,
                         "Folder for a copy of the pack outside the cache");
   }
   if (with_shard) {
-    command->add_option("--shard", options.shard,
-                        "i/n: compute only every n-th chunk, leave it in the cache, publish nothing");
+    command->add_option(
+        "--shard", options.shard,
+        "i/n: compute only every n-th chunk, leave it in the cache, publish nothing");
   }
   command->callback([&options, target] { options.stage.target = target; });
 }
 
 /// What is left of a command's work when a signal ends it, as a sentence for users.
 const char* kept_after_signal(const std::string& command) {
-  constexpr char kStages[] = "finished stages and chunks are kept in the cache, and the same command goes on from them";
+  constexpr char kStages[] =
+      "finished stages and chunks are kept in the cache, and the same command goes on from them";
   constexpr char kMeasurement[] =
       "nothing of the measurement is kept; finished stages and chunks are, in the cache";
   constexpr char kNothing[] = "nothing was written";
   static const std::map<std::string, const char*> kept = {
       {"accuracy", kMeasurement},
       {"chart",
-       "finished pictures are kept in the chart's folder runs, and the same command with --resume goes on from them; "
+       "finished pictures are kept in the chart's folder runs, and the same command with --resume "
+       "goes on from them; "
        "finished stages and chunks are kept in the cache"},
       {"check", kNothing},
       {"compare", kNothing},
@@ -128,9 +136,12 @@ const char* kept_after_signal(const std::string& command) {
       {"pack", kStages},
       {"plan", kMeasurement},
       {"precompute", kStages},
-      {"render", "nothing of the picture is kept; finished stages and chunks of its fabrics are, in the cache"},
+      {"render",
+       "nothing of the picture is kept; finished stages and chunks of its fabrics are, in the "
+       "cache"},
       {"run",
-       "finished pictures, stages and chunks are kept in the cache, and the same command goes on from them; nothing "
+       "finished pictures, stages and chunks are kept in the cache, and the same command goes on "
+       "from them; nothing "
        "is kept of a picture that was being rendered"},
       {"synth", kStages},
       {"transfer", kStages},
@@ -143,18 +154,24 @@ const char* kept_after_signal(const std::string& command) {
 std::map<std::string, std::function<int()>> add_commands(CLI::App& app, Options& options) {
   std::map<std::string, std::function<int()>> actions;
 
-  CLI::App* run = app.add_subcommand("run", "Build everything a scene lacks, then its pictures: the main job");
+  CLI::App* run =
+      app.add_subcommand("run", "Build everything a scene lacks, then its pictures: the main job");
   add_building(*run, options);
   run->add_option("SCENE.toml", options.run.scene, "Scene config")->required();
-  run->add_option("-o,--output,--outfile", options.run.output, "Folder of the pictures; out/NAME where absent");
+  run->add_option("-o,--output,--outfile", options.run.output,
+                  "Folder of the pictures; out/NAME where absent");
   add_order(*run, options.run.order);
   actions["run"] = [&options] { return run_command(options.run, options.common); };
 
-  add_stage_command(app, options, "precompute", "All stages of a fabric up to its pack", StageTarget::kPack, false);
+  add_stage_command(app, options, "precompute", "All stages of a fabric up to its pack",
+                    StageTarget::kPack, false);
   add_stage_command(app, options, "synth", "Fibers of a fabric", StageTarget::kSynth, false);
-  add_stage_command(app, options, "visibility", "Visibility of every segment", StageTarget::kVisibility, true);
-  add_stage_command(app, options, "transfer", "Indirect light transfer of every cell", StageTarget::kTransfer, true);
-  add_stage_command(app, options, "pack", "The folder that a renderer opens", StageTarget::kPack, false);
+  add_stage_command(app, options, "visibility", "Visibility of every segment",
+                    StageTarget::kVisibility, true);
+  add_stage_command(app, options, "transfer", "Indirect light transfer of every cell",
+                    StageTarget::kTransfer, true);
+  add_stage_command(app, options, "pack", "The folder that a renderer opens", StageTarget::kPack,
+                    false);
   add_stage_command(app, options, "accuracy",
                     "What the methods are worth on a fabric: the table that plans are made from",
                     StageTarget::kAccuracy, false);
@@ -169,87 +186,118 @@ std::map<std::string, std::function<int()>> add_commands(CLI::App& app, Options&
   RenderOptions& picture = options.render;
   add_building(*render, options);
   render->add_option("SCENE.toml", picture.scene, "Scene config")->required();
-  render->add_option("-o,--output,--outfile", picture.output, "The .exr file; a .png and a .json go beside it")
+  render
+      ->add_option("-o,--output,--outfile", picture.output,
+                   "The .exr file; a .png and a .json go beside it")
       ->required();
-  render->add_option("--view", picture.view, "Name of one of the scene's [[view]] tables; its [camera] where absent");
+  render->add_option("--view", picture.view,
+                     "Name of one of the scene's [[view]] tables; its [camera] where absent");
   render->add_option("--method", picture.method, "In place of the scene's")
       ->check(CLI::IsMember(method_names()));
-  render->add_option("--spp", picture.spp, "Samples per pixel, in place of the scene's")->check(CLI::Range(1, 1 << 24));
-  render->add_option("--seconds", picture.seconds, "Path tracer: go on until this much time is spent")
+  render->add_option("--spp", picture.spp, "Samples per pixel, in place of the scene's")
+      ->check(CLI::Range(1, 1 << 24));
+  render
+      ->add_option("--seconds", picture.seconds, "Path tracer: go on until this much time is spent")
       ->check(CLI::PositiveNumber);
-  render->add_option("--crop,--cropwindow", picture.crop, "x0,y0,x1,y1 in pixels, x1 and y1 excluded")
+  render
+      ->add_option("--crop,--cropwindow", picture.crop, "x0,y0,x1,y1 in pixels, x1 and y1 excluded")
       ->delimiter(',')
       ->expected(4);
   render->add_flag("--local", picture.local, "Path tracer: paths that leave the cloth's shell end");
-  render->add_option("--bounces", picture.bounces, "Path tracer: scattering events, no limit where absent")
+  render
+      ->add_option("--bounces", picture.bounces,
+                   "Path tracer: scattering events, no limit where absent")
       ->check(CLI::Range(1, 4096));
   render->add_option("--estimator", picture.estimator, "Path tracer: how lights are sampled")
       ->check(CLI::IsMember({"mis", "light", "bcsdf"}));
   add_order(*render, picture.order);
-  add_tolerance(*render, picture.pictures,
-                "Relative RMSE per pixel, noise included: method, samples and data are chosen by a plan",
-                picture.tolerance);
+  add_tolerance(
+      *render, picture.pictures,
+      "Relative RMSE per pixel, noise included: method, samples and data are chosen by a plan",
+      picture.tolerance);
   actions["render"] = [&options] { return render_command(options.render, options.common); };
 
-  CLI::App* evaluate =
-      app.add_subcommand("eval", "JSON lines in, JSON lines out: any scattering model or basis function");
+  CLI::App* evaluate = app.add_subcommand(
+      "eval", "JSON lines in, JSON lines out: any scattering model or basis function");
   evaluate->footer("Quantities and their fields: docs/eval.md");
   actions["eval"] = [] { return run_eval(std::cin, std::cout); };
 
-  CLI::App* compare = app.add_subcommand("compare", "Error metrics of picture A against the reference B");
+  CLI::App* compare =
+      app.add_subcommand("compare", "Error metrics of picture A against the reference B");
   CompareOptions& pair = options.compare;
   add_common(*compare, options);
   compare->add_option("A.exr", pair.a, "Picture")->required();
   compare->add_option("B.exr", pair.b, "Reference")->required();
-  compare->add_option("-o,--output,--outfile", pair.output, "Difference picture: an .exr, and a .png beside it");
-  compare->add_option("--layer", pair.layer, "Layer to compare, such as single; the beauty where absent");
+  compare->add_option("-o,--output,--outfile", pair.output,
+                      "Difference picture: an .exr, and a .png beside it");
+  compare->add_option("--layer", pair.layer,
+                      "Layer to compare, such as single; the beauty where absent");
   compare->add_option("--max-rmse", pair.max_rmse, "Status 1 where the relative RMSE is larger")
       ->check(CLI::NonNegativeNumber);
-  compare->add_option("--max-mean", pair.max_mean, "Status 1 where the mean colour is off by a larger share")
+  compare
+      ->add_option("--max-mean", pair.max_mean,
+                   "Status 1 where the mean colour is off by a larger share")
       ->check(CLI::NonNegativeNumber);
   actions["compare"] = [&options] { return compare_command(options.compare, options.common); };
 
-  CLI::App* plan = app.add_subcommand("plan", "The cheapest way to a picture that is good enough, and why");
+  CLI::App* plan =
+      app.add_subcommand("plan", "The cheapest way to a picture that is good enough, and why");
   add_building(*plan, options);
   plan->add_option("SCENE.toml", options.plan.scene, "Scene config")->required();
-  add_tolerance(*plan, options.plan.pictures, "Relative RMSE per pixel, noise included: 0.05 is 5 %",
-                options.plan.tolerance)
+  add_tolerance(*plan, options.plan.pictures,
+                "Relative RMSE per pixel, noise included: 0.05 is 5 %", options.plan.tolerance)
       ->required();
   plan->add_option("--view", options.plan.view,
                    "Name of one of the scene's [[view]] tables; its [camera] where absent");
-  plan->add_option("--crop,--cropwindow", options.plan.crop, "x0,y0,x1,y1 in pixels, x1 and y1 excluded")
+  plan->add_option("--crop,--cropwindow", options.plan.crop,
+                   "x0,y0,x1,y1 in pixels, x1 and y1 excluded")
       ->delimiter(',')
       ->expected(4);
   actions["plan"] = [&options] { return plan_command(options.plan, options.common); };
 
-  CLI::App* chart = app.add_subcommand("chart", "Speed against accuracy, over the methods and their settings");
+  CLI::App* chart =
+      app.add_subcommand("chart", "Speed against accuracy, over the methods and their settings");
   ChartOptions& asked = options.chart;
   add_building(*chart, options);
   chart->add_option("SCENE.toml", asked.scene, "Scene config")->required();
   chart->add_option("-o,--output,--outfile", asked.output, "Folder of the chart")->required();
-  chart->add_option("--view", asked.view, "Name of one of the scene's [[view]] tables; its [camera] where absent");
-  chart->add_option("--width", asked.width, "Pixels; 96 where neither width nor height nor crop is given")
+  chart->add_option("--view", asked.view,
+                    "Name of one of the scene's [[view]] tables; its [camera] where absent");
+  chart
+      ->add_option("--width", asked.width,
+                   "Pixels; 96 where neither width nor height nor crop is given")
       ->check(CLI::Range(1, 16384));
-  chart->add_option("--height", asked.height, "Pixels; by the view's shape where absent")->check(CLI::Range(1, 16384));
+  chart->add_option("--height", asked.height, "Pixels; by the view's shape where absent")
+      ->check(CLI::Range(1, 16384));
   chart->add_option("--crop,--cropwindow", asked.crop, "x0,y0,x1,y1 in pixels, x1 and y1 excluded")
       ->delimiter(',')
       ->expected(4);
-  chart->add_option("--reference-spp", asked.reference_spp, "Samples per pixel of the two references, 1024 where absent")
+  chart
+      ->add_option("--reference-spp", asked.reference_spp,
+                   "Samples per pixel of the two references, 1024 where absent")
       ->check(CLI::Range(2, 1 << 24));
-  chart->add_option("--methods", asked.methods, "Only runs of these methods, separated by commas; all where absent")
+  chart
+      ->add_option("--methods", asked.methods,
+                   "Only runs of these methods, separated by commas; all where absent")
       ->delimiter(',')
       ->check(CLI::IsMember(method_names()));
-  chart->add_flag("--quick", asked.quick, "Few settings per method: a look, or a check that all of it works");
-  chart->add_flag("--resume", asked.resume, "Keep what an earlier chart in the same folder has rendered and timed");
+  chart->add_flag("--quick", asked.quick,
+                  "Few settings per method: a look, or a check that all of it works");
+  chart->add_flag("--resume", asked.resume,
+                  "Keep what an earlier chart in the same folder has rendered and timed");
   actions["chart"] = [&options] { return chart_command(options.chart, options.common); };
 
-  CLI::App* info = app.add_subcommand("info", "What a file holds: any of ours, or any that we read");
+  CLI::App* info =
+      app.add_subcommand("info", "What a file holds: any of ours, or any that we read");
   add_common(*info, options);
   info->add_option("--seed", options.common.seed, "In place of the seed that the config states");
-  info->add_option("PATH", options.path, "Fabric or scene .toml, pack, .safetensors, .vdb, .exr, .obj")->required();
+  info->add_option("PATH", options.path,
+                   "Fabric or scene .toml, pack, .safetensors, .vdb, .exr, .obj")
+      ->required();
   actions["info"] = [&options] { return info_command(options.path, options.common); };
 
-  CLI::App* check = app.add_subcommand("check", "Checksums, versions, finite values and ranges of a pack");
+  CLI::App* check =
+      app.add_subcommand("check", "Checksums, versions, finite values and ranges of a pack");
   add_common(*check, options);
   check->add_option("PACK", options.path, "Folder with a manifest.json")->required();
   actions["check"] = [&options] { return check_command(options.path, options.common); };
@@ -302,7 +350,8 @@ ProgramEnd run_program(int argc, char** argv) {
     return {kWrongUsage, error.what()};
   } catch (const std::bad_alloc&) {
     return {kFailed, "memory ran out, " + memory_text(available_memory()) +
-                         " are available now: a smaller picture or crop, fewer repeats of the weave or fewer fibers "
+                         " are available now: a smaller picture or crop, fewer repeats of the "
+                         "weave or fewer fibers "
                          "need less"};
   } catch (const std::exception& error) {
     return {kFailed, error.what()};

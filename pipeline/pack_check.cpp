@@ -15,7 +15,8 @@ namespace fs = std::filesystem;
 // Values stored as halves: relative rounding 2^-11, summed over all lobes.
 constexpr double kHalfRounding = 1e-3;
 
-[[noreturn]] void fail(const FabricPack& pack, const char* file, int check, const std::string& reason) {
+[[noreturn]] void fail(const FabricPack& pack, const char* file, int check,
+                       const std::string& reason) {
   throw FileError(fmt::format("{}: check {}: {}", (pack.folder / file).string(), check, reason));
 }
 
@@ -27,13 +28,16 @@ bool nearly_equal(double a, double b) {
 void check_origin(const fs::path& path) {
   const TensorFile file = TensorFile::read(path);
   for (const char* key : {"stage", "key", "config", "program_version"}) {
-    if (file.metadata_value(key).empty()) throw FileError(fmt::format("{}: check 5: no {}", path.string(), key));
+    if (file.metadata_value(key).empty())
+      throw FileError(fmt::format("{}: check 5: no {}", path.string(), key));
   }
 }
 
 void check_scattering(const FabricPack& pack) {
   for (const FiberScattering& fiber : pack.exemplar.scattering) {
-    const auto is_share = [](const Rgbd& color) { return (color >= 0).all() && (color <= 1).all(); };
+    const auto is_share = [](const Rgbd& color) {
+      return (color >= 0).all() && (color <= 1).all();
+    };
     if (!is_share(fiber.color_r) || !is_share(fiber.color_tt)) {
       fail(pack, "fibers.safetensors", 6, "a fiber's colour is outside [0, 1]");
     }
@@ -46,7 +50,8 @@ void check_scattering(const FabricPack& pack) {
 void check_ssdf(const FabricPack& pack) {
   constexpr char kFile[] = "ssdf.safetensors";
   for (const float distance : pack.ssdf->mean) {
-    if (!(std::abs(distance) <= 3.1416F)) fail(pack, kFile, 8, "the mean signed distance is outside [-pi, pi]");
+    if (!(std::abs(distance) <= 3.1416F))
+      fail(pack, kFile, 8, "the mean signed distance is outside [-pi, pi]");
   }
 }
 
@@ -58,7 +63,8 @@ void check_sgs(const FabricPack& pack) {
     double sum = 0;
     for (std::size_t q = 0; q < lobes; ++q) sum += float_from_half(sgs.weights[s * lobes + q]);
     if (sum > 4 * kPi * (1 + kHalfRounding)) {
-      fail(pack, kFile, 9, fmt::format("segment {} sees {:.4g} sr, more than the whole sphere", s, sum));
+      fail(pack, kFile, 9,
+           fmt::format("segment {} sees {:.4g} sr, more than the whole sphere", s, sum));
     }
   }
 }

@@ -19,16 +19,19 @@ std::vector<Rgb> colors_of(const Image& image, const std::string& layer, const s
 
 }  // namespace
 
-PictureComparison compare_images(const Image& picture, const std::string& picture_name, const Image& reference,
-                                 const std::string& reference_name, const std::string& layer) {
+PictureComparison compare_images(const Image& picture, const std::string& picture_name,
+                                 const Image& reference, const std::string& reference_name,
+                                 const std::string& layer) {
   if (picture.width != reference.width || picture.height != reference.height) {
-    throw ConfigError(fmt::format("not comparable: {} has {} x {} pixels, {} has {} x {}", picture_name, picture.width,
-                                  picture.height, reference_name, reference.width, reference.height));
+    throw ConfigError(fmt::format("not comparable: {} has {} x {} pixels, {} has {} x {}",
+                                  picture_name, picture.width, picture.height, reference_name,
+                                  reference.width, reference.height));
   }
   const std::vector<Rgb> colors = colors_of(picture, layer, picture_name);
   const std::vector<Rgb> expected = colors_of(reference, layer, reference_name);
   PictureComparison result;
-  result.halves = layer.empty() && reference.channels.contains("half0.R") && reference.channels.contains("half1.R");
+  result.halves = layer.empty() && reference.channels.contains("half0.R") &&
+                  reference.channels.contains("half1.R");
   if (result.halves) {
     const std::vector<Rgb> half0 = colors_of(reference, "half0", reference_name);
     const std::vector<Rgb> half1 = colors_of(reference, "half1", reference_name);
@@ -44,7 +47,8 @@ PictureComparison compare_images(const Image& picture, const std::string& pictur
   for (int c = 0; c < 3; ++c) {
     ImageChannel channel{ChannelType::kFloat, {}, {}};
     channel.values.reserve(colors.size());
-    for (std::size_t k = 0; k < colors.size(); ++k) channel.values.push_back(colors[k][c] - expected[k][c]);
+    for (std::size_t k = 0; k < colors.size(); ++k)
+      channel.values.push_back(colors[k][c] - expected[k][c]);
     result.difference.channels[names[c]] = std::move(channel);
   }
   const double mean = result.error.mean_reference.mean();
@@ -54,7 +58,9 @@ PictureComparison compare_images(const Image& picture, const std::string& pictur
 
 nlohmann::ordered_json comparison_report(const PictureComparison& comparison) {
   const PictureError& error = comparison.error;
-  const auto list = [](const Rgbd& color) { return nlohmann::ordered_json{color[0], color[1], color[2]}; };
+  const auto list = [](const Rgbd& color) {
+    return nlohmann::ordered_json{color[0], color[1], color[2]};
+  };
   return {{"pixels", error.pixels},
           {"relative_rmse", error.relative_rmse},
           {"mean_picture", list(error.mean_picture)},
@@ -65,10 +71,12 @@ nlohmann::ordered_json comparison_report(const PictureComparison& comparison) {
 
 std::string comparison_text(const PictureComparison& comparison) {
   const PictureError& error = comparison.error;
-  return fmt::format("relative RMSE {:.2f} %, mean colour {:+.2f} % {:+.2f} % {:+.2f} % ({} x {} pixels{})",
-                     100 * error.relative_rmse, 100 * error.relative_difference[0], 100 * error.relative_difference[1],
-                     100 * error.relative_difference[2], comparison.difference.width, comparison.difference.height,
-                     comparison.halves ? ", reference in two halves" : "; noise of the reference counts");
+  return fmt::format(
+      "relative RMSE {:.2f} %, mean colour {:+.2f} % {:+.2f} % {:+.2f} % ({} x {} pixels{})",
+      100 * error.relative_rmse, 100 * error.relative_difference[0],
+      100 * error.relative_difference[1], 100 * error.relative_difference[2],
+      comparison.difference.width, comparison.difference.height,
+      comparison.halves ? ", reference in two halves" : "; noise of the reference counts");
 }
 
 void write_difference(const std::filesystem::path& exr, const PictureComparison& comparison) {

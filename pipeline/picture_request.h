@@ -1,6 +1,7 @@
 #ifndef HEDDLE_PIPELINE_PICTURE_REQUEST_H_
 #define HEDDLE_PIPELINE_PICTURE_REQUEST_H_
-// What options of `render` and `chart` say of the picture. Errors: ConfigError. Tested in tests/pipeline/end_to_end_test.cpp.
+// What options of `render` and `chart` say of the picture. Errors: ConfigError. Tested in
+// tests/pipeline/end_to_end_test.cpp.
 
 #include <string>
 #include <vector>

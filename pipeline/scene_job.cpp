@@ -29,8 +29,9 @@ constexpr int kPictureVersion = 2;
 
 std::string camera_text(const CameraConfig& camera) {
   const auto list = [](const Vec3d& v) { return fmt::format("{},{},{}", v.x(), v.y(), v.z()); };
-  return fmt::format("position {} look_at {} up {} fov {} {} {}x{}", list(camera.position), list(camera.look_at),
-                     list(camera.up), camera.fov, camera.fov_axis == FovAxis::kHorizontal ? "horizontal" : "vertical",
+  return fmt::format("position {} look_at {} up {} fov {} {} {}x{}", list(camera.position),
+                     list(camera.look_at), list(camera.up), camera.fov,
+                     camera.fov_axis == FovAxis::kHorizontal ? "horizontal" : "vertical",
                      camera.width, camera.height);
 }
 
@@ -84,8 +85,8 @@ struct SceneJob::Loaded {
   std::map<fs::path, FabricPack> packs;  // by fabric file
   std::map<fs::path, std::shared_ptr<const TileScene>> tiles;
   std::unique_ptr<ClothScene> scene;
-  std::vector<BcsdfTable> materials;  // of the scene
-  std::vector<Warning> warnings;      // of the packs
+  std::vector<BcsdfTable> materials;                                   // of the scene
+  std::vector<Warning> warnings;                                       // of the packs
   std::vector<std::shared_ptr<const InteractiveSurface>> interactive;  // [surface cloth]
 };
 
@@ -97,7 +98,8 @@ SceneJob::SceneJob(const fs::path& scene_file, StageContext& context, const Scen
   for (const char* key : {"name", "camera", "view", "render"}) text.erase(key);
   for (auto& cloth : text.at("cloth")) cloth.erase("surface_method");  // part of the key on its own
   scene_text_ = text.dump();
-  for (const std::size_t k : variant.stand_ins) config_.cloths.at(k).surface = config_.cloths.at(k).far_surface;
+  for (const std::size_t k : variant.stand_ins)
+    config_.cloths.at(k).surface = config_.cloths.at(k).far_surface;
   for (ClothConfig& cloth : config_.cloths) {
     if (variant.surface_method && cloth.surface && cloth.surface->interactive) {
       cloth.surface_method = *variant.surface_method;
@@ -106,7 +108,9 @@ SceneJob::SceneJob(const fs::path& scene_file, StageContext& context, const Scen
   for (const ClothConfig& cloth : config_.cloths) {
     if (cloth.surface) continue;
     auto& stages = fabrics_[cloth.fabric];
-    if (!stages) stages = std::make_unique<FabricStages>(cloth.fabric, context, variant.of(cloth.fabric).variant);
+    if (!stages)
+      stages =
+          std::make_unique<FabricStages>(cloth.fabric, context, variant.of(cloth.fabric).variant);
   }
 }
 
@@ -145,8 +149,10 @@ Needs SceneJob::needs_for(RenderMethod method, const fs::path& fabric) const {
 std::vector<StageCost> SceneJob::precompute_costs(const PictureRequest& request) {
   packs_for(request.method);
   std::vector<StageCost> all;
-  for (auto& [file, stages] : request.method == RenderMethod::kPrinted ? printed_fabrics() : fabrics_) {
-    for (StageCost& cost : stages->costs(needs_for(request.method, file))) all.push_back(std::move(cost));
+  for (auto& [file, stages] :
+       request.method == RenderMethod::kPrinted ? printed_fabrics() : fabrics_) {
+    for (StageCost& cost : stages->costs(needs_for(request.method, file)))
+      all.push_back(std::move(cost));
   }
   if (!traces_paths(request.method)) {
     loaded_for(request.method);  // the scene, without which its surfaces' data cannot be built
@@ -166,39 +172,49 @@ std::vector<Artifact> SceneJob::packs_for(RenderMethod method) {
 SceneJob::Fabrics& SceneJob::printed_fabrics() {
   if (printed_fabrics_.empty()) {
     for (const auto& [file, stages] : fabrics_) {
-      printed_fabrics_[file] =
-          std::make_unique<FabricStages>(file, *context_, variant_.of(file).variant, BakeChoices::kPrinted);
+      printed_fabrics_[file] = std::make_unique<FabricStages>(
+          file, *context_, variant_.of(file).variant, BakeChoices::kPrinted);
     }
   }
   return printed_fabrics_;
 }
 
 std::string SceneJob::picture_key(const PictureRequest& request) {
-  StageInputs inputs{"picture", kPictureVersion, {{"scene", scene_text_}, {"camera", camera_text(request.camera)}}};
+  StageInputs inputs{"picture",
+                     kPictureVersion,
+                     {{"scene", scene_text_}, {"camera", camera_text(request.camera)}}};
   auto& values = inputs.values;
   values.emplace_back("method", render_method_name(request.method));
   values.emplace_back("crop", crop_text(request.crop));
   values.emplace_back("sampling", fmt::format("spp {} seed {}", request.spp, request.seed));
-  values.emplace_back("paths", fmt::format("local {} bounces {} estimator {}", request.local,
-                                           request.bounces.value_or(0), estimator_name(request.estimator)));
-  values.emplace_back("visibility", fmt::format("blend {} {}", variant_.blend.from, variant_.blend.to));
-  values.emplace_back("shadow_sigma_mm", config_.shadow_sigma_mm ? fmt::format("{}", *config_.shadow_sigma_mm) : "");
+  values.emplace_back("paths",
+                      fmt::format("local {} bounces {} estimator {}", request.local,
+                                  request.bounces.value_or(0), estimator_name(request.estimator)));
+  values.emplace_back("visibility",
+                      fmt::format("blend {} {}", variant_.blend.from, variant_.blend.to));
+  values.emplace_back("shadow_sigma_mm",
+                      config_.shadow_sigma_mm ? fmt::format("{}", *config_.shadow_sigma_mm) : "");
   for (const Artifact& pack : packs_for(request.method)) values.emplace_back("pack", pack.key);
   for (const ClothConfig& cloth : config_.cloths) {
     if (cloth.mesh) values.emplace_back("mesh", content_hash_of_file(cloth.mesh->path));
     if (cloth.surface) values.emplace_back("surface", cloth.surface->text);
   }
-  for (const std::string& surface : surface_stages().keys()) values.emplace_back("interactive", surface);
-  for (const std::size_t k : variant_.stand_ins) values.emplace_back("stand_in", fmt::format("{}", k));
-  for (const fs::path& map : config_.environment_files) values.emplace_back("environment", content_hash_of_file(map));
-  for (const MeshFile& mesh : config_.meshes) values.emplace_back("mesh", content_hash_of_file(mesh.path));
+  for (const std::string& surface : surface_stages().keys())
+    values.emplace_back("interactive", surface);
+  for (const std::size_t k : variant_.stand_ins)
+    values.emplace_back("stand_in", fmt::format("{}", k));
+  for (const fs::path& map : config_.environment_files)
+    values.emplace_back("environment", content_hash_of_file(map));
+  for (const MeshFile& mesh : config_.meshes)
+    values.emplace_back("mesh", content_hash_of_file(mesh.path));
   return stage_key(inputs);
 }
 
 const SurfaceStages& SceneJob::surface_stages() {
   if (!surface_stages_) {
-    surface_stages_.emplace(config_, *context_,
-                            [this](const fs::path& fabric) { return fabrics_.at(fabric)->geometry_key(); });
+    surface_stages_.emplace(config_, *context_, [this](const fs::path& fabric) {
+      return fabrics_.at(fabric)->geometry_key();
+    });
   }
   return *surface_stages_;
 }
@@ -223,7 +239,8 @@ const SceneJob::Loaded& SceneJob::loaded_for(RenderMethod method) {
     }
     tiles.push_back(tile);
   }
-  loaded->scene.reset(new ClothScene(make_cloth_scene(config_, tiles)));  // cannot be moved: built in place
+  // cannot be moved: built in place
+  loaded->scene.reset(new ClothScene(make_cloth_scene(config_, tiles)));
   for (const auto& [file, pack] : loaded->packs) {
     for (Warning& warning : pack_warnings(pack, *loaded->tiles.at(file)))
       loaded->warnings.push_back(std::move(warning));
@@ -240,7 +257,8 @@ struct SceneJob::Shading {
   FrameBuffers frame(const PictureRequest& request, const Camera& camera, const PixelRect& crop,
                      const RenderProgress& progress) const {
     if (tracer) {
-      return trace_picture(*tracer, camera, crop, request.seed, {request.spp, request.seconds, request.more}, progress);
+      return trace_picture(*tracer, camera, crop, request.seed,
+                           {request.spp, request.seconds, request.more}, progress);
     }
     return shade_picture(*renderer, camera, crop, request.spp, progress, request.more);
   }
@@ -270,8 +288,9 @@ std::unique_ptr<SceneJob::Shading> SceneJob::shading_for(const PictureRequest& r
   return shading;
 }
 
-SceneJob::Crops SceneJob::render_crops(const PictureRequest& request, std::span<const PixelRect> crops,
-                                        std::optional<int> transfer_order) {
+SceneJob::Crops SceneJob::render_crops(const PictureRequest& request,
+                                       std::span<const PixelRect> crops,
+                                       std::optional<int> transfer_order) {
   const Camera camera(request.camera);
   loaded_for(request.method);
   Crops result;
@@ -281,7 +300,8 @@ SceneJob::Crops SceneJob::render_crops(const PictureRequest& request, std::span<
   result.frames.resize(crops.size());
   const Stopwatch rendering;
   tbb::parallel_for(std::size_t{0}, crops.size(), [&](std::size_t k) {
-    result.frames[k] = shading->frame(request, camera, crops[k], [](double) { stop_if_interrupted(); });
+    result.frames[k] =
+        shading->frame(request, camera, crops[k], [](double) { stop_if_interrupted(); });
   });
   result.rendering = rendering.elapsed();
   return result;
@@ -291,17 +311,22 @@ const ClothScene& SceneJob::fibers_scene() {
   return *loaded_for(RenderMethod::kPath).scene;
 }
 
-PictureResult SceneJob::render(const PictureRequest& request, const std::string& title, bool quiet) {
+PictureResult SceneJob::render(const PictureRequest& request, const std::string& title,
+                               bool quiet) {
   // More samples than one are possible where a picture goes on until it is good enough.
-  const std::uint64_t bytes = picture_bytes(request.crop.width, request.crop.height, request.more ? 2 : request.spp,
-                                            !traces_paths(request.method));
+  const std::uint64_t bytes =
+      picture_bytes(request.crop.width, request.crop.height, request.more ? 2 : request.spp,
+                    !traces_paths(request.method));
   announce_memory(*context_->console,
-                  fmt::format("{}: {} x {} pixels", title, request.crop.width, request.crop.height), bytes);
+                  fmt::format("{}: {} x {} pixels", title, request.crop.width, request.crop.height),
+                  bytes);
   std::string key = picture_key(request);
   const Loaded& loaded = loaded_for(request.method);
   const Camera camera(request.camera);
 
-  PictureSetup setup{loaded.scene.get(), {}, config_.lights, &camera, request.crop, request.method, blend_for(request.method)};
+  PictureSetup setup{
+      loaded.scene.get(),       {}, config_.lights, &camera, request.crop, request.method,
+      blend_for(request.method)};
   setup.interactive_surfaces = !traces_paths(request.method) && !surface_stages().keys().empty();
   std::vector<const FabricPack*> packs;
   for (const ClothConfig& cloth : config_.cloths) {
@@ -314,15 +339,18 @@ PictureResult SceneJob::render(const PictureRequest& request, const std::string&
   };
   add_warnings(picture_warnings(setup));
   const auto say_from = [&](std::size_t first) {
-    for (std::size_t k = first; k < warnings.size() && !quiet; ++k) context_->console->warn(warning_text(warnings[k]));
+    for (std::size_t k = first; k < warnings.size() && !quiet; ++k)
+      context_->console->warn(warning_text(warnings[k]));
   };
   say_from(0);
   const Stopwatch watch;
 
   // Progress in samples, or in seconds where those are the budget.
-  const auto pixels = static_cast<std::uint64_t>(request.crop.width) * static_cast<std::uint64_t>(request.crop.height);
-  const std::uint64_t total = request.seconds ? static_cast<std::uint64_t>(std::ceil(*request.seconds))
-                                              : pixels * static_cast<std::uint64_t>(request.spp);
+  const auto pixels = static_cast<std::uint64_t>(request.crop.width) *
+                      static_cast<std::uint64_t>(request.crop.height);
+  const std::uint64_t total = request.seconds
+                                  ? static_cast<std::uint64_t>(std::ceil(*request.seconds))
+                                  : pixels * static_cast<std::uint64_t>(request.spp);
   Progress progress(*context_->console, title, request.seconds ? "seconds" : "samples", total);
   std::uint64_t shown = 0;
   const RenderProgress report_progress = [&](double share) {

@@ -1,7 +1,8 @@
 #ifndef HEDDLE_PIPELINE_SCENE_JOB_H_
 #define HEDDLE_PIPELINE_SCENE_JOB_H_
-// From a scene file to pictures: finds out what a picture needs, has the stages of its fabrics build what is missing, loads
-// packs and meshes once, renders. Tested in tests/pipeline/end_to_end_test.cpp.
+// From a scene file to pictures: finds out what a picture needs, has the stages of its fabrics
+// build what is missing, loads packs and meshes once, renders. Tested in
+// tests/pipeline/end_to_end_test.cpp.
 
 #include <filesystem>
 #include <map>
@@ -29,7 +30,8 @@ struct SceneVariant {
   std::optional<int> order;  // of the transfer; the fabric's where empty
   FabricVariant fabric;
   VisibilityBlend blend;
-  std::optional<SurfaceMethod> surface_method;  // of all cloths that have a choice; the scene's where empty
+  // of all cloths that have a choice; the scene's where empty
+  std::optional<SurfaceMethod> surface_method;
   /// Of one fabric (its file as the scene's config has it), in place of `order` and `fabric`.
   struct OfFabric {
     std::optional<int> order;
@@ -37,7 +39,8 @@ struct SceneVariant {
     auto operator<=>(const OfFabric&) const = default;
   };
   std::map<std::filesystem::path, OfFabric> fabrics = {};
-  std::set<std::size_t> stand_ins = {};  // cloths (places in SceneConfig::cloths) drawn by their far_surface
+  // cloths (places in SceneConfig::cloths) drawn by their far_surface
+  std::set<std::size_t> stand_ins = {};
   auto operator<=>(const SceneVariant&) const = default;
 
   OfFabric of(const std::filesystem::path& file) const {
@@ -70,25 +73,28 @@ struct PictureResult {
 class SceneJob {
  public:
   /// `context` outlives the object.
-  SceneJob(const std::filesystem::path& scene_file, StageContext& context, const SceneVariant& variant = {});
+  SceneJob(const std::filesystem::path& scene_file, StageContext& context,
+           const SceneVariant& variant = {});
   ~SceneJob();
 
   const SceneConfig& config() const { return config_; }
   /// The picture that a view of the scene asks for.
   PictureRequest request(const ViewConfig& view) const;
-  /// The path-traced crop that goes with it. Its seed is the next one: an error against a reference that shares the picture's
-  /// random numbers would look smaller than it is.
+  /// The path-traced crop that goes with it. Its seed is the next one: an error against a reference
+  /// that shares the picture's random numbers would look smaller than it is.
   PictureRequest reference_request(const ViewConfig& view) const;
 
   /// Builds what the picture needs; equal keys, equal pictures.
   std::string picture_key(const PictureRequest& request);
-  /// The report holds the warnings of docs/stability.md; they are said on the console too, unless `quiet`.
+  /// The report holds the warnings of docs/stability.md; they are said on the console too, unless
+  /// `quiet`.
   PictureResult render(const PictureRequest& request, const std::string& title, bool quiet = false);
-  /// What the precomputed data of the picture took to build, all fabrics; they are built where missing.
+  /// What the precomputed data of the picture took to build, all fabrics; they are built where
+  /// missing.
   std::vector<StageCost> precompute_costs(const PictureRequest& request);
 
-  /// Frames of some rectangles of the view, in place of request.crop, without progress; builds what the picture needs. The
-  /// work that all of them share (fits of environments) is in `setup`.
+  /// Frames of some rectangles of the view, in place of request.crop, without progress; builds what
+  /// the picture needs. The work that all of them share (fits of environments) is in `setup`.
   struct Crops {
     std::vector<FrameBuffers> frames;  // [crop]
     WorkTime setup;
@@ -106,7 +112,8 @@ class SceneJob {
   /// The variant's, but the paper's own for `printed`.
   VisibilityBlend blend_for(RenderMethod method) const;
   Needs needs_for(RenderMethod method, const std::filesystem::path& fabric) const;
-  std::unique_ptr<Shading> shading_for(const PictureRequest& request, std::optional<int> transfer_order = {});
+  std::unique_ptr<Shading> shading_for(const PictureRequest& request,
+                                       std::optional<int> transfer_order = {});
   using Fabrics = std::map<std::filesystem::path, std::unique_ptr<FabricStages>>;
   Fabrics& printed_fabrics();
   std::vector<Artifact> packs_for(RenderMethod method);

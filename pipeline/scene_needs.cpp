@@ -7,7 +7,8 @@ Needs needs_of(RenderMethod method, std::span<const Light> lights, const Visibil
   if (traces_paths(method) || method == RenderMethod::kDualScattering) return needs;
   needs.transfer = true;
   needs.volume = method == RenderMethod::kVolume;
-  if (method == RenderMethod::kPrt || method == RenderMethod::kTsaiShih16 || method == RenderMethod::kTsaiShihFull) {
+  if (method == RenderMethod::kPrt || method == RenderMethod::kTsaiShih16 ||
+      method == RenderMethod::kTsaiShihFull) {
     needs.ssdf = true;
     return needs;
   }

@@ -24,7 +24,8 @@ Json read_sealed_json(const std::filesystem::path& path) {
   if (document.is_object() && document.contains(kSeal)) {
     const Json seal = document.at(kSeal);
     document.erase(kSeal);
-    if (seal == content_hash(document.dump(-1, ' ', false, Json::error_handler_t::replace))) return document;
+    if (seal == content_hash(document.dump(-1, ' ', false, Json::error_handler_t::replace)))
+      return document;
   }
   throw FileError(path.string() + ": corrupt (its own checksum differs)");
 }

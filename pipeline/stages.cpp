@@ -28,8 +28,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Segments per visibility chunk and cells per transfer chunk: a few seconds of two cores, so that little is lost when a
-// job is killed, and enough work for many threads.
+// Segments per visibility chunk and cells per transfer chunk: a few seconds of two cores, so that
+// little is lost when a job is killed, and enough work for many threads.
 constexpr std::uint32_t kSegmentsPerChunk = 256;
 constexpr std::uint32_t kCellsPerChunk = 32;
 
@@ -46,7 +46,8 @@ void write_transfer_chunk(const fs::path& path, const TransferChunk& chunk, int 
   writer.write(path);
 }
 
-TransferChunk read_transfer_chunk(const fs::path& path, std::uint32_t first_cell, std::uint64_t cells, int order) {
+TransferChunk read_transfer_chunk(const fs::path& path, std::uint32_t first_cell,
+                                  std::uint64_t cells, int order) {
   const auto bands = static_cast<std::uint64_t>(order + 1);
   const TensorFile file = TensorFile::read(path);
   TransferChunk chunk;
@@ -59,7 +60,8 @@ TransferChunk read_transfer_chunk(const fs::path& path, std::uint32_t first_cell
 }
 
 void announce(Console* console, const char* stage, double items, const char* unit, double bytes) {
-  announce_memory(*console, fmt::format("{}: {:.3g} {}", stage, items, unit), static_cast<std::uint64_t>(bytes));
+  announce_memory(*console, fmt::format("{}: {:.3g} {}", stage, items, unit),
+                  static_cast<std::uint64_t>(bytes));
 }
 
 /// Advances a progress of 100 items by the share done.
@@ -73,7 +75,9 @@ AccuracyProgress percent_of(Progress& progress) {
 }
 
 std::string hash_of_geometry(const Exemplar& exemplar) {
-  const auto bytes_of = [](const auto& values) { return content_hash(std::as_bytes(std::span(values))); };
+  const auto bytes_of = [](const auto& values) {
+    return content_hash(std::as_bytes(std::span(values)));
+  };
   return stage_key({"geometry",
                     1,
                     {{"tile_mm", fmt::format("{} {}", exemplar.width_mm, exemplar.height_mm)},
@@ -87,12 +91,14 @@ std::string hash_of_geometry(const Exemplar& exemplar) {
 FabricDocument read_fabric_document(const fs::path& path, std::optional<std::uint64_t> seed,
                                     const FabricVariant& variant) {
   const TomlTable document = TomlTable::load(path);
-  if (document.has("model")) document.fail("model", "this fabric has no fibers: a scene names it by the key surface");
+  if (document.has("model"))
+    document.fail("model", "this fabric has no fibers: a scene names it by the key surface");
   FabricDocument fabric;
   fabric.file = path;
   fabric.config = read_fabric_config(document);
   if (seed) fabric.config.seed = *seed;
-  fabric.visibility = read_visibility_settings(document.table("visibility"), fabric.config.light_from_both_sides);
+  fabric.visibility =
+      read_visibility_settings(document.table("visibility"), fabric.config.light_from_both_sides);
   fabric.visibility.seed = fabric.config.seed;
   fabric.transfer = read_transfer_settings(document.table("transfer"));
   fabric.transfer.both_sides = fabric.config.light_from_both_sides;
@@ -100,11 +106,13 @@ FabricDocument read_fabric_document(const fs::path& path, std::optional<std::uin
   fabric.volume = read_volume_settings(document.table("volume"));
   document.finish();
 
-  // canonical_text() is JSON. Defaults go in as well: an artifact made with another one is another artifact.
+  // canonical_text() is JSON. Defaults go in as well: an artifact made with another one is another
+  // artifact.
   auto cloth = nlohmann::json::parse(document.canonical_text());
   for (const AskedKey& asked : document.asked_keys()) {
     const bool has_default = asked.default_value != "required" && asked.default_value != "optional";
-    if (has_default && asked.path != "light_from") cloth["defaults"][asked.path] = asked.default_value;
+    if (has_default && asked.path != "light_from")
+      cloth["defaults"][asked.path] = asked.default_value;
   }
   const auto take_section = [&cloth](const std::string& name) {
     nlohmann::json section = {{"set", cloth.at(name)}};
@@ -139,13 +147,14 @@ FabricDocument read_fabric_document(const fs::path& path, std::optional<std::uin
   return fabric;
 }
 
-FabricStages::FabricStages(const fs::path& fabric_file, StageContext& context, const FabricVariant& variant,
-                           BakeChoices choices)
+FabricStages::FabricStages(const fs::path& fabric_file, StageContext& context,
+                           const FabricVariant& variant, BakeChoices choices)
     : document_(read_fabric_document(fabric_file, context.seed, variant)), context_(&context) {
   if (choices == BakeChoices::kShipped) return;
   if (document_.config.light_from_both_sides) {
-    throw ConfigError(fabric_file.string() +
-                      ": the printed axes lie above the horizon, and this fabric takes light from both sides");
+    throw ConfigError(
+        fabric_file.string() +
+        ": the printed axes lie above the horizon, and this fabric takes light from both sides");
   }
   origin_choice_ = OriginChoice::kMidpoint;
   document_.visibility.sgs = {FibonacciSet::kPrinted, 48, 128, SgWeights::kVoronoi};
@@ -159,7 +168,10 @@ Stage make_stage(std::string name, int version, std::string extension, const std
   upstream.emplace_back("config", config);
   Stage stage;
   stage.key = stage_key({name, version, std::move(upstream)});
-  stage.metadata = {{"stage", name}, {"key", stage.key}, {"config", config}, {"program_version", kProgramVersion}};
+  stage.metadata = {{"stage", name},
+                    {"key", stage.key},
+                    {"config", config},
+                    {"program_version", kProgramVersion}};
   stage.name = std::move(name);
   stage.extension = std::move(extension);
   return stage;
@@ -169,7 +181,8 @@ void StageContext::report(StageResult result) {
   for (const StageResult& earlier : results) {
     if (earlier.stage == result.stage && earlier.key == result.key) return;
   }
-  std::string how = result.built ? fmt::format("built in {}", duration_text(result.seconds)) : "cached";
+  std::string how =
+      result.built ? fmt::format("built in {}", duration_text(result.seconds)) : "cached";
   if (result.resumed > 0) how += fmt::format(", {} chunks were already done", result.resumed);
   console->say(fmt::format("{}: {:<9} {}", result.fabric, result.stage, how));
   results.push_back(std::move(result));
@@ -188,20 +201,23 @@ bool is_sound(const Stage& stage, StageContext& context) {
 
 Artifact provide_artifact(const Stage& stage, const std::string& fabric, StageContext& context,
                           const std::function<void(const fs::path&, StageResult&)>& build) {
-  const Artifact artifact{stage.key, context.cache.artifact(stage.name, stage.key, stage.extension)};
-  StageResult result{.fabric = fabric, .stage = stage.name, .key = stage.key, .artifact = artifact.path};
+  const Artifact artifact{stage.key,
+                          context.cache.artifact(stage.name, stage.key, stage.extension)};
+  StageResult result{
+      .fabric = fabric, .stage = stage.name, .key = stage.key, .artifact = artifact.path};
   if (!is_sound(stage, context)) {
     stop_if_interrupted();
     const WorkTime outer = std::exchange(context.nested, {});
     const Stopwatch watch;
-    result.built = publish_artifact(artifact.path, context.cache.record(stage.name, stage.key), [&](const fs::path& path) {
-      build(path, result);
-      const WorkTime whole = watch.elapsed();
-      const WorkTime own = whole - context.nested;
-      context.nested = outer + whole;
-      result.seconds = own.seconds;
-      return BuildCost{own + result.earlier, working_threads()};
-    });
+    result.built = publish_artifact(artifact.path, context.cache.record(stage.name, stage.key),
+                                    [&](const fs::path& path) {
+                                      build(path, result);
+                                      const WorkTime whole = watch.elapsed();
+                                      const WorkTime own = whole - context.nested;
+                                      context.nested = outer + whole;
+                                      result.seconds = own.seconds;
+                                      return BuildCost{own + result.earlier, working_threads()};
+                                    });
     context.sound.insert(artifact.path);
   }
   context.report(std::move(result));
@@ -218,14 +234,16 @@ StageCost recorded_cost(const Stage& stage, const Cache& cache) {
           .present = fs::exists(cache.artifact(stage.name, stage.key, stage.extension))};
 }
 
-Artifact FabricStages::artifact_of(const Stage& stage,
-                                   const std::function<void(const fs::path&, StageResult&)>& build) {
+Artifact FabricStages::artifact_of(
+    const Stage& stage, const std::function<void(const fs::path&, StageResult&)>& build) {
   return provide_artifact(stage, document_.config.name, *context_, build);
 }
 
 std::vector<StageCost> FabricStages::costs(const Needs& needs) {
   std::vector<StageCost> costs;
-  const auto add = [&](const Stage& stage) { costs.push_back(recorded_cost(stage, context_->cache)); };
+  const auto add = [&](const Stage& stage) {
+    costs.push_back(recorded_cost(stage, context_->cache));
+  };
   add(synth_stage());
   if (needs.ssdf || needs.sgs) add(maps_stage());
   if (needs.ssdf) add(ssdf_stage());
@@ -247,8 +265,8 @@ const TileScene& FabricStages::scene() {
 
 const SegmentOrigins& FabricStages::origins() {
   if (!origins_) {
-    origins_ =
-        find_segment_origins(scene(), document_.config.light_from_both_sides, origin_choice_, document_.config.seed);
+    origins_ = find_segment_origins(scene(), document_.config.light_from_both_sides, origin_choice_,
+                                    document_.config.seed);
   }
   return *origins_;
 }
@@ -283,9 +301,11 @@ Artifact FabricStages::synth() {
   });
 }
 
-/// Publishes one chunk. The process that publishes the artifact removes the chunks' folder, whoever writes there.
+/// Publishes one chunk. The process that publishes the artifact removes the chunks' folder, whoever
+/// writes there.
 template <class Compute>
-bool FabricStages::publish_chunk(const Stage& stage, std::uint32_t first, std::uint32_t end, Compute&& compute) {
+bool FabricStages::publish_chunk(const Stage& stage, std::uint32_t first, std::uint32_t end,
+                                 Compute&& compute) {
   const PartialChunks chunks(context_->cache, stage.name, stage.key);
   while (!is_sound(stage, *context_)) {
     const Stopwatch watch;
@@ -304,7 +324,8 @@ bool FabricStages::publish_chunk(const Stage& stage, std::uint32_t first, std::u
 
 template <class Compute>
 bool FabricStages::finish_chunks(const Stage& stage, std::uint32_t items, std::uint32_t per_chunk,
-                                 const std::string& unit, Shard shard, StageResult& result, Compute&& compute) {
+                                 const std::string& unit, Shard shard, StageResult& result,
+                                 Compute&& compute) {
   const PartialChunks chunks(context_->cache, stage.name, stage.key);
   std::vector<std::uint32_t> missing;
   std::uint64_t items_of_shard = 0;
@@ -333,10 +354,11 @@ bool FabricStages::finish_chunks(const Stage& stage, std::uint32_t items, std::u
   return true;
 }
 
-/// read(file, first, end) for all chunks in order; a chunk that is broken or has vanished is computed again.
+/// read(file, first, end) for all chunks in order; a chunk that is broken or has vanished is
+/// computed again.
 template <class Compute, class Read>
-bool FabricStages::read_chunks(const Stage& stage, std::uint32_t items, std::uint32_t per_chunk, Compute&& compute,
-                               Read&& read) {
+bool FabricStages::read_chunks(const Stage& stage, std::uint32_t items, std::uint32_t per_chunk,
+                               Compute&& compute, Read&& read) {
   const PartialChunks chunks(context_->cache, stage.name, stage.key);
   for (std::uint32_t first = 0; first < items; first += per_chunk) {
     const std::uint32_t end = std::min(first + per_chunk, items);
@@ -373,16 +395,20 @@ void FabricStages::run_shard(const Stage& stage, Work&& work) {
 // Maps do not depend on [visibility], which says how they are compressed.
 Stage FabricStages::maps_stage() {
   std::vector<std::pair<std::string, std::string>> upstream = {
-      {"geometry", geometry_key()}, {"light_from", light_from()}, {"seed", fmt::format("{}", document_.config.seed)}};
+      {"geometry", geometry_key()},
+      {"light_from", light_from()},
+      {"seed", fmt::format("{}", document_.config.seed)}};
   append_origins(upstream);
   return make_stage("maps", 3, ".safetensors", "", std::move(upstream));
 }
 
 /// Computes one chunk of maps.
-void FabricStages::compute_maps(const Stage& stage, const fs::path& file, std::uint32_t first, std::uint32_t end) {
-  write_visibility_maps(file,
-                        bake_visibility_maps(scene(), origins(), document_.config.light_from_both_sides, first, end),
-                        stage.metadata);
+void FabricStages::compute_maps(const Stage& stage, const fs::path& file, std::uint32_t first,
+                                std::uint32_t end) {
+  write_visibility_maps(
+      file,
+      bake_visibility_maps(scene(), origins(), document_.config.light_from_both_sides, first, end),
+      stage.metadata);
 }
 
 Artifact FabricStages::maps() {
@@ -399,12 +425,14 @@ Artifact FabricStages::maps() {
     all.both_sides = document_.config.light_from_both_sides;
     const auto read = [&](const fs::path& file, std::uint32_t first, std::uint32_t end) {
       const VisibilityMaps chunk = read_visibility_maps(file);
-      if (chunk.first_segment != first || chunk.count() != end - first || chunk.both_sides != all.both_sides) {
+      if (chunk.first_segment != first || chunk.count() != end - first ||
+          chunk.both_sides != all.both_sides) {
         throw FileError(file.string() + ": not the chunk that its name says");
       }
       all.append(chunk);
     };
-    if (!finish_chunks(stage, segments, kSegmentsPerChunk, "segments", Shard{}, result, compute)) return;
+    if (!finish_chunks(stage, segments, kSegmentsPerChunk, "segments", Shard{}, result, compute))
+      return;
     if (!read_chunks(stage, segments, kSegmentsPerChunk, compute, read)) return;
     write_visibility_maps(path, all, stage.metadata);
   });
@@ -415,15 +443,18 @@ Artifact FabricStages::maps() {
 void FabricStages::visibility_shard(Shard shard) {
   const Stage stage = maps_stage();
   run_shard(stage, [&](StageResult& result) {
-    finish_chunks(
-        stage, static_cast<std::uint32_t>(exemplar().segment_count()), kSegmentsPerChunk, "segments", shard, result,
-        [&](const fs::path& file, std::uint32_t first, std::uint32_t end) { compute_maps(stage, file, first, end); });
+    finish_chunks(stage, static_cast<std::uint32_t>(exemplar().segment_count()), kSegmentsPerChunk,
+                  "segments", shard, result,
+                  [&](const fs::path& file, std::uint32_t first, std::uint32_t end) {
+                    compute_maps(stage, file, first, end);
+                  });
   });
 }
 
 Stage FabricStages::fit_stage(const std::string& name, int version) {
-  return make_stage(name, version, ".safetensors", document_.visibility_text,
-                    {{"maps", maps_stage().key}, {"seed", fmt::format("{}", document_.config.seed)}});
+  return make_stage(
+      name, version, ".safetensors", document_.visibility_text,
+      {{"maps", maps_stage().key}, {"seed", fmt::format("{}", document_.config.seed)}});
 }
 
 Stage FabricStages::ssdf_stage() {
@@ -436,14 +467,16 @@ Stage FabricStages::sg_stage() {
 Artifact FabricStages::ssdf() {
   const Stage stage = ssdf_stage();
   return artifact_of(stage, [&](const fs::path& path, StageResult&) {
-    write_ssdf(path, fit_ssdf(read_visibility_maps(maps().path), document_.visibility), stage.metadata);
+    write_ssdf(path, fit_ssdf(read_visibility_maps(maps().path), document_.visibility),
+               stage.metadata);
   });
 }
 
 Artifact FabricStages::sgs() {
   const Stage stage = sg_stage();
   return artifact_of(stage, [&](const fs::path& path, StageResult&) {
-    write_sg_visibility(path, fit_sgs(read_visibility_maps(maps().path), document_.visibility), stage.metadata);
+    write_sg_visibility(path, fit_sgs(read_visibility_maps(maps().path), document_.visibility),
+                        stage.metadata);
   });
 }
 
@@ -451,7 +484,8 @@ const char* FabricStages::light_from() const {
   return document_.config.light_from_both_sides ? "both" : "face";
 }
 
-void FabricStages::append_origins(std::vector<std::pair<std::string, std::string>>& upstream) const {
+void FabricStages::append_origins(
+    std::vector<std::pair<std::string, std::string>>& upstream) const {
   if (origin_choice_ == OriginChoice::kMidpoint) upstream.emplace_back("origins", "midpoint");
 }
 
@@ -462,10 +496,11 @@ TransferSettings FabricStages::transfer_settings(std::optional<int> order) const
 }
 
 Stage FabricStages::transfer_stage(const TransferSettings& settings) {
-  std::vector<std::pair<std::string, std::string>> upstream = {{"fibers", synth_stage().key},
-                                                               {"order", fmt::format("{}", settings.order)},
-                                                               {"light_from", light_from()},
-                                                               {"seed", fmt::format("{}", settings.seed)}};
+  std::vector<std::pair<std::string, std::string>> upstream = {
+      {"fibers", synth_stage().key},
+      {"order", fmt::format("{}", settings.order)},
+      {"light_from", light_from()},
+      {"seed", fmt::format("{}", settings.seed)}};
   append_origins(upstream);
   return make_stage("transfer", 4, ".safetensors", document_.transfer_text, std::move(upstream));
 }
@@ -482,13 +517,15 @@ struct FabricStages::TransferWork {
   }
 };
 
-std::unique_ptr<FabricStages::TransferWork> FabricStages::transfer_work(const TransferSettings& settings) {
+std::unique_ptr<FabricStages::TransferWork> FabricStages::transfer_work(
+    const TransferSettings& settings) {
   auto work = std::make_unique<TransferWork>();
-  for (const FiberScattering& scattering : exemplar().scattering) work->materials.emplace_back(scattering);
+  for (const FiberScattering& scattering : exemplar().scattering)
+    work->materials.emplace_back(scattering);
   work->settings = settings;
   const double mean_free_path = scene().mean_free_path(settings.seed, kMeanFreePathSamples);
-  work->cells =
-      make_segment_cells(exemplar(), origins(), static_cast<float>(settings.cell_mean_free_paths * mean_free_path));
+  work->cells = make_segment_cells(
+      exemplar(), origins(), static_cast<float>(settings.cell_mean_free_paths * mean_free_path));
   work->baker.emplace(scene(), work->materials, origins(), settings, work->cells);
   return work;
 }
@@ -499,9 +536,11 @@ Artifact FabricStages::transfer(std::optional<int> order) {
   const Artifact artifact = artifact_of(stage, [&](const fs::path& path, StageResult& result) {
     const auto work = transfer_work(settings);
     const std::uint32_t cells = work->baker->cell_count();
-    // Matrices of all cells: chunks, what is assembled of them, and two copies while that is written.
+    // Matrices of all cells: chunks, what is assembled of them, and two copies while that is
+    // written.
     const double bands = (settings.order + 1) * (settings.order + 1);
-    announce(context_->console, "transfer", cells, "cells", 3 * 3 * sizeof(float) * bands * bands * cells);
+    announce(context_->console, "transfer", cells, "cells",
+             3 * 3 * sizeof(float) * bands * bands * cells);
     const auto compute = [&](const fs::path& file, std::uint32_t first, std::uint32_t end) {
       work->compute(file, first, end);
     };
@@ -529,16 +568,19 @@ Artifact FabricStages::volume() {
 }
 
 Artifact FabricStages::pack(const Needs& needs) {
-  std::vector<std::pair<std::string, std::string>> upstream = {{"fibers.safetensors", synth_stage().key}};
+  std::vector<std::pair<std::string, std::string>> upstream = {
+      {"fibers.safetensors", synth_stage().key}};
   if (needs.ssdf) upstream.emplace_back("ssdf.safetensors", ssdf_stage().key);
   if (needs.sgs) upstream.emplace_back("sg.safetensors", sg_stage().key);
   if (needs.transfer) {
-    upstream.emplace_back("transfer.safetensors", transfer_stage(transfer_settings(needs.order)).key);
+    upstream.emplace_back("transfer.safetensors",
+                          transfer_stage(transfer_settings(needs.order)).key);
   }
   if (needs.volume) upstream.emplace_back("volume.vdb", volume_stage().key);
   upstream.emplace_back("light_from", light_from());
   const Stage stage = make_stage("pack", 1, "", document_.config.name, std::move(upstream));
-  return artifact_of(stage, [&](const fs::path& folder, StageResult&) { fill_pack(folder, stage.key, needs); });
+  return artifact_of(
+      stage, [&](const fs::path& folder, StageResult&) { fill_pack(folder, stage.key, needs); });
 }
 
 void FabricStages::fill_pack(const fs::path& folder, const std::string& key, const Needs& needs) {
@@ -547,7 +589,8 @@ void FabricStages::fill_pack(const fs::path& folder, const std::string& key, con
   manifest.key = key;
   manifest.program_version = kProgramVersion;
   manifest.light_from_both_sides = document_.config.light_from_both_sides;
-  manifest.counts = {{"fibers", exemplar().fiber_count()}, {"segments", exemplar().segment_count()}};
+  manifest.counts = {{"fibers", exemplar().fiber_count()},
+                     {"segments", exemplar().segment_count()}};
   make_folder(folder);
   const auto add = [&](const char* name, const Artifact& artifact) {
     write_file_atomically(folder / name, read_whole_file(artifact.path));
@@ -566,12 +609,13 @@ void FabricStages::fill_pack(const fs::path& folder, const std::string& key, con
 
 Stage FabricStages::accuracy_stage(const SurfaceFabric* surface) {
   if (surface != nullptr) {
-    return make_stage("accuracy", kAccuracyVersion, ".json", surface->text,
-                      {{"fibers", synth().key}, {"seed", fmt::format("{}", document_.config.seed)}});
+    return make_stage(
+        "accuracy", kAccuracyVersion, ".json", surface->text,
+        {{"fibers", synth().key}, {"seed", fmt::format("{}", document_.config.seed)}});
   }
   std::vector<std::pair<std::string, std::string>> upstream;
-  for (const Stage& stage :
-       {synth_stage(), ssdf_stage(), sg_stage(), transfer_stage(transfer_settings({})), volume_stage()}) {
+  for (const Stage& stage : {synth_stage(), ssdf_stage(), sg_stage(),
+                             transfer_stage(transfer_settings({})), volume_stage()}) {
     upstream.emplace_back(stage.name, stage.key);
   }
   return make_stage("accuracy", kAccuracyVersion, ".json", "", std::move(upstream));
@@ -590,7 +634,8 @@ Artifact FabricStages::accuracy(const SurfaceFabric* surface) {
       table = measure_accuracy_table();
     } else {
       Progress progress(*context_->console, stage.name, "%", 100);
-      table = measure_surface_accuracy(exemplar(), *surface, document_.config.seed, percent_of(progress));
+      table = measure_surface_accuracy(exemplar(), *surface, document_.config.seed,
+                                       percent_of(progress));
     }
     table.fabric = document_.config.name;
     table.key = stage.key;
@@ -603,7 +648,8 @@ AccuracyTable FabricStages::measure_accuracy_table() {
   std::map<std::string, WorkTime> costs;
   const auto note_costs = [&costs](FabricStages& stages, const std::string& suffix) {
     for (const StageCost& cost : stages.costs(kEverything)) {
-      if (cost.seconds >= 0) costs.try_emplace(cost.stage + suffix, WorkTime{cost.seconds, cost.core_seconds});
+      if (cost.seconds >= 0)
+        costs.try_emplace(cost.stage + suffix, WorkTime{cost.seconds, cost.core_seconds});
     }
   };
   data.pack = load_pack(pack(kEverything).path);
@@ -630,7 +676,8 @@ AccuracyTable FabricStages::measure_accuracy_table() {
       if (order >= data.pack.transfer->order) continue;
       const double ratio = transfer_order_ratio(order);
       const WorkTime& whole = costs.at("transfer");
-      costs["transfer, " + order_setting(order)] = {ratio * whole.seconds, ratio * whole.core_seconds};
+      costs["transfer, " + order_setting(order)] = {ratio * whole.seconds,
+                                                    ratio * whole.core_seconds};
     }
   }
   Progress progress(*context_->console, "accuracy", "%", 100);
@@ -656,9 +703,10 @@ void FabricStages::transfer_shard(std::optional<int> order, Shard shard) {
   const Stage stage = transfer_stage(settings);
   run_shard(stage, [&](StageResult& result) {
     const auto work = transfer_work(settings);
-    finish_chunks(
-        stage, work->baker->cell_count(), kCellsPerChunk, "cells", shard, result,
-        [&](const fs::path& file, std::uint32_t first, std::uint32_t end) { work->compute(file, first, end); });
+    finish_chunks(stage, work->baker->cell_count(), kCellsPerChunk, "cells", shard, result,
+                  [&](const fs::path& file, std::uint32_t first, std::uint32_t end) {
+                    work->compute(file, first, end);
+                  });
   });
 }
 

@@ -1,8 +1,9 @@
 #ifndef HEDDLE_PIPELINE_STAGES_H_
 #define HEDDLE_PIPELINE_STAGES_H_
-// The stages of one fabric, from its config to its pack. A stage is a pure function from (its section of the config,
-// upstream artifacts) to one artifact; a stage whose key is in the cache is not run, and nothing is built that the caller
-// does not ask for (directly or through what it asks for).
+// The stages of one fabric, from its config to its pack. A stage is a pure function from (its
+// section of the config, upstream artifacts) to one artifact; a stage whose key is in the cache is
+// not run, and nothing is built that the caller does not ask for (directly or through what it asks
+// for).
 //
 //   synth       config without the sections below           fibers.safetensors       Exemplar
 //   maps        geometry, light_from, seed  in chunks       maps.safetensors         VisibilityMaps
@@ -13,10 +14,10 @@
 //   pack        what the pack is to hold                    folder                   FabricPack
 //   accuracy    all of the above                            KEY.json                 AccuracyTable
 //
-// "Geometry" is a hash of the fibers' shapes: a fabric that differs in its dyes only shares maps, ssdf, sg and volume.
-// Keys hold the values of defaults too. An algorithm or a layout that changes needs a new version number of its stage
-// (stages.cpp).
-// Errors: ConfigError, FileError, Interrupted. Tested in tests/pipeline/end_to_end_test.cpp.
+// "Geometry" is a hash of the fibers' shapes: a fabric that differs in its dyes only shares maps,
+// ssdf, sg and volume. Keys hold the values of defaults too. An algorithm or a layout that changes
+// needs a new version number of its stage (stages.cpp). Errors: ConfigError, FileError,
+// Interrupted. Tested in tests/pipeline/end_to_end_test.cpp.
 
 #include <compare>
 #include <cstdint>
@@ -54,10 +55,12 @@ struct Needs {
   std::optional<int> order;  // of the transfer; the fabric's where empty
 };
 
-inline constexpr Needs kEverything{.ssdf = true, .sgs = true, .transfer = true, .volume = true, .order = {}};
+inline constexpr Needs kEverything{
+    .ssdf = true, .sgs = true, .transfer = true, .volume = true, .order = {}};
 
-/// kPrinted: segment origins on the fiber's axis, and sums of Gaussians by the paper's axes, Voronoi weights and sharpness
-/// 128, whatever [visibility] says of them (Khungurn 2017, section 4.1). Cells are the leaves of our tree in both.
+/// kPrinted: segment origins on the fiber's axis, and sums of Gaussians by the paper's axes,
+/// Voronoi weights and sharpness 128, whatever [visibility] says of them (Khungurn 2017,
+/// section 4.1). Cells are the leaves of our tree in both.
 enum class BakeChoices : std::uint8_t { kShipped, kPrinted };
 
 /// Which of the chunks of a long stage this process does: chunk c where c % count == index.
@@ -85,7 +88,7 @@ struct StageContext {
   Console* console;
   std::optional<std::uint64_t> seed;  // in place of the fabric's
   std::vector<StageResult> results;
-  WorkTime nested = {};  // spent by stages that the running stage asked for
+  WorkTime nested = {};                         // spent by stages that the running stage asked for
   std::set<std::filesystem::path> sound = {};   // artifacts that this command has verified or built
   std::set<std::filesystem::path> broken = {};  // those that it has found broken and named
 
@@ -93,7 +96,8 @@ struct StageContext {
   void report(StageResult result);
 };
 
-/// Settings of a fabric changed for one purpose (a chart), as factors of what its config says; keys change with them.
+/// Settings of a fabric changed for one purpose (a chart), as factors of what its config says; keys
+/// change with them.
 struct FabricVariant {
   double cell_size = 1;   // of [transfer] cell_mean_free_paths
   double voxel_rate = 1;  // of [volume] voxels_per_radius
@@ -122,7 +126,8 @@ struct FabricDocument {
   std::string transfer_text;    // of [transfer] without order
   std::string volume_text;      // of [volume]
 };
-FabricDocument read_fabric_document(const std::filesystem::path& path, std::optional<std::uint64_t> seed,
+FabricDocument read_fabric_document(const std::filesystem::path& path,
+                                    std::optional<std::uint64_t> seed,
                                     const FabricVariant& variant = {});
 
 /// Where a stage's artifact lies.
@@ -141,16 +146,19 @@ struct Stage {
 Stage make_stage(std::string name, int version, std::string extension, const std::string& config,
                  std::vector<std::pair<std::string, std::string>> upstream);
 
-/// Is the artifact in the cache, and as it was written? Reads all of it the first time. A broken one is named on the
-/// console.
+/// Is the artifact in the cache, and as it was written? Reads all of it the first time. A broken
+/// one is named on the console.
 bool is_sound(const Stage& stage, StageContext& context);
 
-/// The stage's artifact; where the cache lacks it or holds a broken one, build(path, result) makes it under a temporary
-/// path, or makes nothing where another process has published it meanwhile. `fabric`: for the report.
-Artifact provide_artifact(const Stage& stage, const std::string& fabric, StageContext& context,
-                          const std::function<void(const std::filesystem::path&, StageResult&)>& build);
+/// The stage's artifact; where the cache lacks it or holds a broken one, build(path, result) makes
+/// it under a temporary path, or makes nothing where another process has published it meanwhile.
+/// `fabric`: for the report.
+Artifact provide_artifact(
+    const Stage& stage, const std::string& fabric, StageContext& context,
+    const std::function<void(const std::filesystem::path&, StageResult&)>& build);
 
-/// What the artifact took to build, by whatever process; seconds < 0 where there is no record of it.
+/// What the artifact took to build, by whatever process; seconds < 0 where there is no record of
+/// it.
 StageCost recorded_cost(const Stage& stage, const Cache& cache);
 
 /// Rays from which the mean free path of a fabric is estimated: good to about 1 %.
@@ -159,9 +167,10 @@ inline constexpr int kMeanFreePathSamples = 20000;
 class FabricStages {
  public:
   /// `context` outlives the object. A relative path is taken from the working directory.
-  /// Errors: ConfigError where the printed axes, which lie above the horizon, meet light from both sides.
-  FabricStages(const std::filesystem::path& fabric_file, StageContext& context, const FabricVariant& variant = {},
-               BakeChoices choices = BakeChoices::kShipped);
+  /// Errors: ConfigError where the printed axes, which lie above the horizon, meet light from both
+  /// sides.
+  FabricStages(const std::filesystem::path& fabric_file, StageContext& context,
+               const FabricVariant& variant = {}, BakeChoices choices = BakeChoices::kShipped);
   ~FabricStages();
 
   const FabricDocument& document() const { return document_; }
@@ -176,36 +185,39 @@ class FabricStages {
   Artifact volume();
   Artifact pack(const Needs& needs);
 
-  /// What the methods are worth on this fabric (pipeline/plan/measure_accuracy.h). With a surface model: what that is worth in
-  /// place of the fibers.
+  /// What the methods are worth on this fabric (pipeline/plan/measure_accuracy.h). With a surface
+  /// model: what that is worth in place of the fibers.
   Artifact accuracy(const SurfaceFabric* surface = nullptr);
   /// Where that lies, built or not; builds the fibers only.
   Artifact accuracy_place(const SurfaceFabric* surface = nullptr);
 
-  /// What the stages behind pack(needs) took when they were built, by whatever process; seconds < 0 where an artifact came
-  /// without its record, or is not there. Builds the fibers only.
+  /// What the stages behind pack(needs) took when they were built, by whatever process; seconds < 0
+  /// where an artifact came without its record, or is not there. Builds the fibers only.
   std::vector<StageCost> costs(const Needs& needs);
 
-  /// Computes this shard's chunks and leaves them in the cache; a later run of the stage finds them.
+  /// Computes this shard's chunks and leaves them in the cache; a later run of the stage finds
+  /// them.
   void visibility_shard(Shard shard);
   void transfer_shard(std::optional<int> order, Shard shard);
 
  private:
   struct TransferWork;
-  Artifact artifact_of(const Stage& stage,
-                       const std::function<void(const std::filesystem::path&, StageResult&)>& build);
+  Artifact artifact_of(
+      const Stage& stage,
+      const std::function<void(const std::filesystem::path&, StageResult&)>& build);
   void fill_pack(const std::filesystem::path& folder, const std::string& key, const Needs& needs);
   template <class Work>
   void run_shard(const Stage& stage, Work&& work);
   template <class Compute>
   bool publish_chunk(const Stage& stage, std::uint32_t first, std::uint32_t end, Compute&& compute);
-  /// compute(file, first, end) for those of the shard's chunks that are not on disk. False, as from the other two, where
-  /// another process has published the artifact meanwhile.
+  /// compute(file, first, end) for those of the shard's chunks that are not on disk. False, as from
+  /// the other two, where another process has published the artifact meanwhile.
   template <class Compute>
-  bool finish_chunks(const Stage& stage, std::uint32_t items, std::uint32_t per_chunk, const std::string& unit,
-                     Shard shard, StageResult& result, Compute&& compute);
+  bool finish_chunks(const Stage& stage, std::uint32_t items, std::uint32_t per_chunk,
+                     const std::string& unit, Shard shard, StageResult& result, Compute&& compute);
   template <class Compute, class Read>
-  bool read_chunks(const Stage& stage, std::uint32_t items, std::uint32_t per_chunk, Compute&& compute, Read&& read);
+  bool read_chunks(const Stage& stage, std::uint32_t items, std::uint32_t per_chunk,
+                   Compute&& compute, Read&& read);
 
   const Exemplar& exemplar();
   const TileScene& scene();
@@ -215,7 +227,8 @@ class FabricStages {
   void append_origins(std::vector<std::pair<std::string, std::string>>& upstream) const;
   Stage maps_stage();
   Artifact maps();
-  void compute_maps(const Stage& stage, const std::filesystem::path& file, std::uint32_t first, std::uint32_t end);
+  void compute_maps(const Stage& stage, const std::filesystem::path& file, std::uint32_t first,
+                    std::uint32_t end);
   Stage synth_stage() const;
   Stage fit_stage(const std::string& name, int version);
   Stage ssdf_stage();

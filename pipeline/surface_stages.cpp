@@ -32,7 +32,8 @@ std::string weights_text(const MicrocylinderFabric& fabric, const InteractiveSet
 }
 
 /// The shapes of everything in a scene.
-std::string geometry_text(const SceneConfig& config, const std::function<std::string(const fs::path&)>& geometry_key) {
+std::string geometry_text(const SceneConfig& config,
+                          const std::function<std::string(const fs::path&)>& geometry_key) {
   Json cloths = Json::array();
   for (const ClothConfig& cloth : config.cloths) {
     Json shape = {{"underlay", cloth.underlay}};
@@ -45,13 +46,15 @@ std::string geometry_text(const SceneConfig& config, const std::function<std::st
     cloths.push_back(shape);
   }
   Json meshes = Json::array();
-  for (const MeshFile& mesh : config.meshes) meshes.push_back({content_hash_of_file(mesh.path), mesh.mm_per_unit});
+  for (const MeshFile& mesh : config.meshes)
+    meshes.push_back({content_hash_of_file(mesh.path), mesh.mm_per_unit});
   return Json{{"cloths", cloths}, {"meshes", meshes}}.dump();
 }
 
 Stage maps_stage(const std::string& geometry, std::size_t cloth, ClothSide side) {
-  return make_stage("surface-maps", 1, ".safetensors", geometry,
-                    {{"cloth", fmt::format("{}", cloth)}, {"side", side == ClothSide::kFace ? "face" : "back"}});
+  return make_stage(
+      "surface-maps", 1, ".safetensors", geometry,
+      {{"cloth", fmt::format("{}", cloth)}, {"side", side == ClothSide::kFace ? "face" : "back"}});
 }
 
 }  // namespace
@@ -66,10 +69,11 @@ SurfaceStages::SurfaceStages(const SceneConfig& config, StageContext& context,
     surfaces_.emplace_back();
     if (cloth.surface_method != SurfaceMethod::kInteractive) continue;
     if (geometry.empty()) geometry = geometry_text(config, geometry_key);
-    surfaces_.back() =
-        Surface{&*cloth.surface,
-                make_stage("surface-weights", 2, ".safetensors", weights_text(*cloth.surface->interactive, {}), {}),
-                maps_stage(geometry, index, ClothSide::kFace), maps_stage(geometry, index, ClothSide::kBack)};
+    surfaces_.back() = Surface{&*cloth.surface,
+                               make_stage("surface-weights", 2, ".safetensors",
+                                          weights_text(*cloth.surface->interactive, {}), {}),
+                               maps_stage(geometry, index, ClothSide::kFace),
+                               maps_stage(geometry, index, ClothSide::kBack)};
   }
 }
 
@@ -77,7 +81,8 @@ std::vector<std::string> SurfaceStages::keys() const {
   std::vector<std::string> keys;
   for (const std::optional<Surface>& surface : surfaces_) {
     if (!surface) continue;
-    for (const Stage* stage : {&surface->weights, &surface->face, &surface->back}) keys.push_back(stage->key);
+    for (const Stage* stage : {&surface->weights, &surface->face, &surface->back})
+      keys.push_back(stage->key);
   }
   return keys;
 }
@@ -95,11 +100,12 @@ std::vector<StageCost> SurfaceStages::costs() const {
   return costs;
 }
 
-std::shared_ptr<const DistanceMaps> SurfaceStages::maps(const Surface& surface, ClothSide side, const ClothScene& scene,
+std::shared_ptr<const DistanceMaps> SurfaceStages::maps(const Surface& surface, ClothSide side,
+                                                        const ClothScene& scene,
                                                         const SurfaceCloth& cloth) const {
   const Stage& stage = side == ClothSide::kFace ? surface.face : surface.back;
-  const Artifact artifact =
-      provide_artifact(stage, surface.fabric->name, *context_, [&](const fs::path& path, StageResult&) {
+  const Artifact artifact = provide_artifact(
+      stage, surface.fabric->name, *context_, [&](const fs::path& path, StageResult&) {
         Progress progress(*context_->console, stage.name, "vertices", cloth.vertex_count());
         const auto vertex_done = [&progress] {
           stop_if_interrupted();
@@ -107,12 +113,15 @@ std::shared_ptr<const DistanceMaps> SurfaceStages::maps(const Surface& surface, 
         };
         bake_distance_maps(scene, cloth, side, vertex_done).write(path, stage.metadata);
       });
-  return std::make_shared<const DistanceMaps>(DistanceMaps::read(artifact.path, cloth.vertex_count()));
+  return std::make_shared<const DistanceMaps>(
+      DistanceMaps::read(artifact.path, cloth.vertex_count()));
 }
 
-std::vector<std::shared_ptr<const InteractiveSurface>> SurfaceStages::load(const ClothScene& scene) const {
+std::vector<std::shared_ptr<const InteractiveSurface>> SurfaceStages::load(
+    const ClothScene& scene) const {
   std::vector<std::shared_ptr<const InteractiveSurface>> loaded;
-  std::map<std::string, std::shared_ptr<const InteractiveMicrocylinder>> models;  // by the fabric's text
+  // by the fabric's text
+  std::map<std::string, std::shared_ptr<const InteractiveMicrocylinder>> models;
   for (const std::optional<Surface>& surface : surfaces_) {
     const SurfaceCloth& cloth = scene.surfaces()[loaded.size()];
     loaded.emplace_back();
@@ -123,15 +132,17 @@ std::vector<std::shared_ptr<const InteractiveSurface>> SurfaceStages::load(const
       const InteractiveSettings settings;
       const std::vector<TangentSample> tangents = tangent_samples(fabric, settings.most_tangents);
       const Artifact table =
-          provide_artifact(surface->weights, surface->fabric->name, *context_, [&](const fs::path& path, StageResult&) {
-            WeightingTable(fabric, tangents, settings.weighting, settings.table)
-                .write(path, surface->weights.metadata);
-          });
-      model = std::make_shared<const InteractiveMicrocylinder>(fabric, settings,
-                                                               WeightingTable::read(table.path, tangents.size()));
+          provide_artifact(surface->weights, surface->fabric->name, *context_,
+                           [&](const fs::path& path, StageResult&) {
+                             WeightingTable(fabric, tangents, settings.weighting, settings.table)
+                                 .write(path, surface->weights.metadata);
+                           });
+      model = std::make_shared<const InteractiveMicrocylinder>(
+          fabric, settings, WeightingTable::read(table.path, tangents.size()));
     }
-    loaded.back() = std::make_shared<const InteractiveSurface>(model, maps(*surface, ClothSide::kFace, scene, cloth),
-                                                               maps(*surface, ClothSide::kBack, scene, cloth));
+    loaded.back() = std::make_shared<const InteractiveSurface>(
+        model, maps(*surface, ClothSide::kFace, scene, cloth),
+        maps(*surface, ClothSide::kBack, scene, cloth));
   }
   return loaded;
 }

@@ -36,7 +36,8 @@ double median(std::vector<double> values) {
 }
 
 /// The cube of about `edge` that holds each segment's midpoint; whole cubes along the tile.
-std::map<std::array<int, 3>, std::vector<std::uint32_t>> cubes_of(const Exemplar& exemplar, double edge) {
+std::map<std::array<int, 3>, std::vector<std::uint32_t>> cubes_of(const Exemplar& exemplar,
+                                                                  double edge) {
   const Vec3d size(exemplar.width_mm, exemplar.height_mm, exemplar.z_max - exemplar.z_min);
   const Vec3d scale = (size / edge).array().round().max(1.0) / size.array();
   std::map<std::array<int, 3>, std::vector<std::uint32_t>> cubes;
@@ -59,8 +60,8 @@ double edge_of_cubes(const Exemplar& exemplar, std::size_t count, double shortes
   return high;
 }
 
-/// Median over segments of the rms angle between the fibers of a segment's cube and their mean direction, the largest
-/// principal axis of t t^T.
+/// Median over segments of the rms angle between the fibers of a segment's cube and their mean
+/// direction, the largest principal axis of t t^T.
 double neighbour_angle_of(const Exemplar& exemplar, double edge) {
   std::vector<double> angles;  // [segment]
   for (const auto& [cube, segments] : cubes_of(exemplar, edge)) {
@@ -69,8 +70,10 @@ double neighbour_angle_of(const Exemplar& exemplar, double edge) {
       const Vec3d tangent = exemplar.segment_tangent(s).cast<double>();
       tensor += tangent * tangent.transpose();
     }
-    const double along = Eigen::SelfAdjointEigenSolver<Mat3d>(tensor).eigenvalues()[2] / tensor.trace();
-    angles.insert(angles.end(), segments.size(), std::asin(std::sqrt(std::clamp(1 - along, 0.0, 1.0))));
+    const double along =
+        Eigen::SelfAdjointEigenSolver<Mat3d>(tensor).eigenvalues()[2] / tensor.trace();
+    angles.insert(angles.end(), segments.size(),
+                  std::asin(std::sqrt(std::clamp(1 - along, 0.0, 1.0))));
   }
   return median(std::move(angles));
 }
@@ -81,7 +84,8 @@ double narrowest_lobe(const std::vector<FiberScattering>& fibers) {
   for (const FiberScattering& fiber : fibers) {
     if (fiber.isotropic_white) continue;
     if (fiber.color_r.maxCoeff() > kLeastShare) width = std::min(width, fiber.beta_r);
-    if (((1 - fiber.color_r) * fiber.color_tt).maxCoeff() > kLeastShare) width = std::min(width, fiber.beta_tt);
+    if (((1 - fiber.color_r) * fiber.color_tt).maxCoeff() > kLeastShare)
+      width = std::min(width, fiber.beta_tt);
   }
   return width;
 }
@@ -106,7 +110,8 @@ bool is_near_rim(const ClothScene& scene, const ShellHit& hit) {
   const double reach = kRimThicknesses * (shell.z_max() - shell.z_min());
   for (int k = 0; k < 8; ++k) {
     const double angle = k * kPi / 4;
-    const Eigen::Vector2d place = hit.fabric.head<2>() + reach * Eigen::Vector2d(std::cos(angle), std::sin(angle));
+    const Eigen::Vector2d place =
+        hit.fabric.head<2>() + reach * Eigen::Vector2d(std::cos(angle), std::sin(angle));
     if (!scene.surface_point(hit, place, ClothSide::kFace)) return true;
   }
   return false;
@@ -135,7 +140,8 @@ Probe probe_of(const PictureSetup& setup) {
       if (is_near_rim(scene, *hit)) ++probe.near_rim;
       for (std::size_t l = 0; l < setup.lights.size() && !setup.packs.empty(); ++l) {
         RandomStream random(1, RandomStage::kLightVisibility,
-                            static_cast<std::uint64_t>(y) << 32U | static_cast<std::uint64_t>(x), l);
+                            static_cast<std::uint64_t>(y) << 32U | static_cast<std::uint64_t>(x),
+                            l);
         const Vec3 direction = sample_light(setup.lights[l], random).direction;
         const float height_of_light = scene.fabric_direction(*hit, direction).z();
         if (setup.packs[hit->cloth]->light_from_both_sides) {
@@ -151,7 +157,8 @@ Probe probe_of(const PictureSetup& setup) {
 }
 
 bool takes_visibility_forms(RenderMethod method) {
-  return method == RenderMethod::kExact || method == RenderMethod::kVolume || method == RenderMethod::kPrinted;
+  return method == RenderMethod::kExact || method == RenderMethod::kVolume ||
+         method == RenderMethod::kPrinted;
 }
 
 void add_light_warnings(const PictureSetup& setup, std::vector<Warning>& warnings) {
@@ -161,34 +168,42 @@ void add_light_warnings(const PictureSetup& setup, std::vector<Warning>& warning
   }
   for (std::size_t l = 0; l < setup.lights.size(); ++l) {
     const Light& light = setup.lights[l];
-    if (light.type == LightType::kSphericalGaussian && setup.interactive_surfaces && light.sharpness < kInteractiveSharpness) {
-      warnings.push_back({"wide-light",
-                          fmt::format("{} has sharpness {:g}, and interactive surfaces take light below {:g} as if their weights were constant across it",
-                                      light_name(l, setup.lights.size()), light.sharpness, kInteractiveSharpness),
-                          light.sharpness < 3 ? 0.4 : 0.13, "surface_method = \"sampled\", or several sharper lights in its place"});
+    if (light.type == LightType::kSphericalGaussian && setup.interactive_surfaces &&
+        light.sharpness < kInteractiveSharpness) {
+      warnings.push_back(
+          {"wide-light",
+           fmt::format("{} has sharpness {:g}, and interactive surfaces take light below {:g} as "
+                       "if their weights were constant across it",
+                       light_name(l, setup.lights.size()), light.sharpness, kInteractiveSharpness),
+           light.sharpness < 3 ? 0.4 : 0.13,
+           "surface_method = \"sampled\", or several sharper lights in its place"});
     }
-    if (light.type != LightType::kSphericalGaussian || !takes_visibility_forms(setup.method)) continue;
+    if (light.type != LightType::kSphericalGaussian || !takes_visibility_forms(setup.method))
+      continue;
     const double sharpness = light.sharpness;
-    const std::string name = fmt::format("{} has sharpness {:g}", light_name(l, setup.lights.size()), sharpness);
+    const std::string name =
+        fmt::format("{} has sharpness {:g}", light_name(l, setup.lights.size()), sharpness);
     const double lobes_limit = sphere != nullptr ? kSphereLobesSharpness : kLobesSharpness;
     if (setup.blend.uses_lobes(light.sharpness) && sharpness > lobes_limit) {
       warnings.push_back(
           {"sum-of-gaussians",
-           fmt::format("{}, and sums of Gaussians, which leak light from sharpness {:g} on, serve it alone", name,
-                       lobes_limit),
+           fmt::format(
+               "{}, and sums of Gaussians, which leak light from sharpness {:g} on, serve it alone",
+               name, lobes_limit),
            0.3, "Let signed distances serve it (visibility blend 10 to 20)"});
     }
     if (setup.blend.uses_distance(light.sharpness) && sharpness < kDistanceSharpness) {
-      warnings.push_back({"signed-distance",
-                          fmt::format("{}, and signed distances, which know one edge only, serve it below {:g}", name,
-                                      kDistanceSharpness),
-                          0.4, "Let sums of Gaussians serve it (visibility blend 10 to 20)"});
+      warnings.push_back(
+          {"signed-distance",
+           fmt::format("{}, and signed distances, which know one edge only, serve it below {:g}",
+                       name, kDistanceSharpness),
+           0.4, "Let sums of Gaussians serve it (visibility blend 10 to 20)"});
     }
     if (setup.method == RenderMethod::kPrinted && sharpness < kPrintedGammaSharpness) {
-      warnings.push_back(
-          {"gamma",
-           fmt::format("{}; Gamma as printed is off at grazing views below {:g}", name, kPrintedGammaSharpness), 0.15,
-           "--method exact"});
+      warnings.push_back({"gamma",
+                          fmt::format("{}; Gamma as printed is off at grazing views below {:g}",
+                                      name, kPrintedGammaSharpness),
+                          0.15, "--method exact"});
     }
   }
 }
@@ -196,8 +211,8 @@ void add_light_warnings(const PictureSetup& setup, std::vector<Warning>& warning
 }  // namespace
 
 std::string warning_text(const Warning& warning) {
-  return fmt::format("warning: {}: {}; expect errors of about {}. {}.", warning.subject, warning.what,
-                     percent(warning.expected_error), warning.instead);
+  return fmt::format("warning: {}: {}; expect errors of about {}. {}.", warning.subject,
+                     warning.what, percent(warning.expected_error), warning.instead);
 }
 
 nlohmann::ordered_json warnings_report(std::span<const Warning> warnings) {
@@ -215,7 +230,8 @@ std::vector<Warning> warnings_of(const nlohmann::json& report) {
   std::vector<Warning> warnings;
   for (const auto& entry : report) {
     warnings.push_back({entry.at("subject").get<std::string>(), entry.at("what").get<std::string>(),
-                        entry.at("expected_relative_error").get<double>(), entry.at("instead").get<std::string>()});
+                        entry.at("expected_relative_error").get<double>(),
+                        entry.at("instead").get<std::string>()});
   }
   return warnings;
 }
@@ -237,9 +253,11 @@ PackFacts pack_facts(const FabricPack& pack, const TileScene& tile) {
   if (!(facts.mean_free_path_mm > 0)) return facts;  // no fiber sees another
   if (pack.transfer) {
     facts.cell_mean_free_paths =
-        edge_of_cubes(exemplar, pack.transfer->cell_count(), 0.2 * facts.mean_free_path_mm) / facts.mean_free_path_mm;
+        edge_of_cubes(exemplar, pack.transfer->cell_count(), 0.2 * facts.mean_free_path_mm) /
+        facts.mean_free_path_mm;
   }
-  facts.neighbour_angle = neighbour_angle_of(exemplar, kNeighbourMeanFreePaths * facts.mean_free_path_mm);
+  facts.neighbour_angle =
+      neighbour_angle_of(exemplar, kNeighbourMeanFreePaths * facts.mean_free_path_mm);
   facts.lobe_width = narrowest_lobe(exemplar.scattering);
   return facts;
 }
@@ -249,20 +267,22 @@ std::vector<Warning> pack_warnings(const FabricPack& pack, const TileScene& tile
   if (!pack.transfer) return warnings;
   const PackFacts facts = pack_facts(pack, tile);
   if (facts.cell_mean_free_paths > kCellMeanFreePaths) {
-    warnings.push_back(
-        {"cells",
-         fmt::format("{}: {} cells, as large as cubes of {:.1f} mean free paths ({:.0f} um each); too dark and blocky",
-                     pack.name, pack.transfer->cell_count(), facts.cell_mean_free_paths, 1e3 * facts.mean_free_path_mm),
-         0.3, "A smaller cell_mean_free_paths in [transfer]"});
+    warnings.push_back({"cells",
+                        fmt::format("{}: {} cells, as large as cubes of {:.1f} mean free paths "
+                                    "({:.0f} um each); too dark and blocky",
+                                    pack.name, pack.transfer->cell_count(),
+                                    facts.cell_mean_free_paths, 1e3 * facts.mean_free_path_mm),
+                        0.3, "A smaller cell_mean_free_paths in [transfer]"});
   }
   const double spread = std::hypot(facts.neighbour_angle, facts.lobe_width);
   if (facts.mean_free_path_mm > 0 && !pack.transfer->cones && spread < radians(kParallelDegrees)) {
-    warnings.push_back(
-        {"truncation",
-         fmt::format("{}: neighbouring fibers lie within {:.1f} degrees of each other and scatter into lobes of {:.1f} "
-                     "degrees; light stays narrower than harmonics of order {} hold",
-                     pack.name, degrees(facts.neighbour_angle), degrees(facts.lobe_width), pack.transfer->order),
-         0.25, "cones = \"on\" in [transfer], or --method path"});
+    warnings.push_back({"truncation",
+                        fmt::format("{}: neighbouring fibers lie within {:.1f} degrees of each "
+                                    "other and scatter into lobes of {:.1f} "
+                                    "degrees; light stays narrower than harmonics of order {} hold",
+                                    pack.name, degrees(facts.neighbour_angle),
+                                    degrees(facts.lobe_width), pack.transfer->order),
+                        0.25, "cones = \"on\" in [transfer], or --method path"});
   }
   return warnings;
 }
@@ -274,11 +294,13 @@ std::vector<Warning> picture_warnings(const PictureSetup& setup) {
   std::size_t tets = 0;
   for (std::uint32_t cloth = 0; cloth < setup.scene->cloth_count(); ++cloth)
     tets += setup.scene->shell(cloth).tets().size();
-  const double hidden = tets > 0 ? static_cast<double>(flipped + degenerate) / static_cast<double>(tets) : 0;
+  const double hidden =
+      tets > 0 ? static_cast<double>(flipped + degenerate) / static_cast<double>(tets) : 0;
   if (hidden > kHiddenTetShare) {
     warnings.push_back(
         {"shell",
-         fmt::format("{} of {} tetrahedra of the cloth's shell are flipped and {} degenerate: folds tighter than the "
+         fmt::format("{} of {} tetrahedra of the cloth's shell are flipped and {} degenerate: "
+                     "folds tighter than the "
                      "cloth is thick, or collapsed UVs; nothing is drawn inside them",
                      flipped, tets, degenerate),
          hidden, "A smoother mesh, or thinner cloth"});
@@ -288,47 +310,54 @@ std::vector<Warning> picture_warnings(const PictureSetup& setup) {
   add_light_warnings(setup, warnings);
   const Probe probe = probe_of(setup);
   if (probe.hits == 0) return warnings;
-  const auto share = [&](std::size_t count) { return static_cast<double>(count) / static_cast<double>(probe.hits); };
+  const auto share = [&](std::size_t count) {
+    return static_cast<double>(count) / static_cast<double>(probe.hits);
+  };
   for (std::size_t l = 0; l < setup.lights.size(); ++l) {
     const std::string name = light_name(l, setup.lights.size());
     if (share(probe.behind[l]) > kBehindShare) {
-      warnings.push_back(
-          {"behind",
-           fmt::format("{} reaches {} of the cloth in the picture from behind, and the data hold light from the face "
-                       "only: what shines through is missing",
-                       name, percent(share(probe.behind[l]))),
-           1, "light_from = \"both\" in the fabric, an underlay where nothing should shine through, or --method path"});
+      warnings.push_back({"behind",
+                          fmt::format("{} reaches {} of the cloth in the picture from behind, and "
+                                      "the data hold light from the face "
+                                      "only: what shines through is missing",
+                                      name, percent(share(probe.behind[l]))),
+                          1,
+                          "light_from = \"both\" in the fabric, an underlay where nothing should "
+                          "shine through, or --method path"});
     }
     if (share(probe.in_plane[l]) > 0.5) {
-      warnings.push_back(
-          {"behind",
-           fmt::format(
-               "{} lies within {:g} degrees of the plane of {} of the cloth in the picture, whose data hold light "
-               "from both sides: harmonics see it from both",
-               name, kPlaneDegrees, percent(share(probe.in_plane[l]))),
-           0.15, "light_from = \"face\", or --method path"});
+      warnings.push_back({"behind",
+                          fmt::format("{} lies within {:g} degrees of the plane of {} of the cloth "
+                                      "in the picture, whose data hold light "
+                                      "from both sides: harmonics see it from both",
+                                      name, kPlaneDegrees, percent(share(probe.in_plane[l]))),
+                          0.15, "light_from = \"face\", or --method path"});
     }
   }
   const double pixel = median(probe.pixel_radii);
   if (pixel < kPixelRadii) {
     warnings.push_back(
         {"zoom",
-         fmt::format("a pixel is {:.2g} radii of a fiber wide: a segment has one visibility, and it shows", pixel),
+         fmt::format(
+             "a pixel is {:.2g} radii of a fiber wide: a segment has one visibility, and it shows",
+             pixel),
          0.35, "--method path"});
   }
   if (share(probe.grazing) > 0.5) {
-    warnings.push_back({"grazing",
-                        fmt::format("{} of the cloth in the picture is seen at more than {:g} degrees from its normal",
-                                    percent(share(probe.grazing)), kGrazingDegrees),
-                        0.15, "--method path"});
+    warnings.push_back(
+        {"grazing",
+         fmt::format(
+             "{} of the cloth in the picture is seen at more than {:g} degrees from its normal",
+             percent(share(probe.grazing)), kGrazingDegrees),
+         0.15, "--method path"});
   }
   if (share(probe.near_rim) > kRimShare) {
-    warnings.push_back(
-        {"rim",
-         fmt::format("{} of the cloth in the picture lies within its own thickness of a rim or a UV seam; the data are "
-                     "those of endless cloth",
-                     percent(share(probe.near_rim))),
-         0.1, "--method path, or UVs without a seam there"});
+    warnings.push_back({"rim",
+                        fmt::format("{} of the cloth in the picture lies within its own thickness "
+                                    "of a rim or a UV seam; the data are "
+                                    "those of endless cloth",
+                                    percent(share(probe.near_rim))),
+                        0.1, "--method path, or UVs without a seam there"});
   }
   return warnings;
 }
@@ -342,13 +371,12 @@ std::vector<Warning> frame_warnings(const PictureSetup& setup, const FrameBuffer
     all += static_cast<double>(value.abs().sum());
   }
   if (all > 0 && negative / all > kNegativeShare) {
-    warnings.push_back(
-        {"ringing",
-         fmt::format(
-             "{} of the light that scattered more than once is negative: harmonics ring under strong light from "
-             "one side",
-             percent(negative / all)),
-         0.2, "--method path, or softer light"});
+    warnings.push_back({"ringing",
+                        fmt::format("{} of the light that scattered more than once is negative: "
+                                    "harmonics ring under strong light from "
+                                    "one side",
+                                    percent(negative / all)),
+                        0.2, "--method path, or softer light"});
   }
   if (frame.variance.empty()) return warnings;
   const Probe probe = probe_of(setup);
@@ -360,14 +388,14 @@ std::vector<Warning> frame_warnings(const PictureSetup& setup, const FrameBuffer
     variance += static_cast<double>(frame.variance[k].sum());
     mean += static_cast<double>(frame.beauty[k].sum());
   }
-  const double count =
-      static_cast<double>(std::count_if(frame.alpha.begin(), frame.alpha.end(), [](float a) { return a >= 1; }));
+  const double count = static_cast<double>(
+      std::count_if(frame.alpha.begin(), frame.alpha.end(), [](float a) { return a >= 1; }));
   const double noise = mean > 0 ? std::sqrt(variance * count * 3) / mean : 0;
   if (noise > kNoise) {
-    warnings.push_back(
-        {"distance",
-         fmt::format("a pixel covers {:.1f} repeats of the cloth with {} samples", median(probe.repeats), frame.spp),
-         noise, "More samples, or a surface model in place of fibers"});
+    warnings.push_back({"distance",
+                        fmt::format("a pixel covers {:.1f} repeats of the cloth with {} samples",
+                                    median(probe.repeats), frame.spp),
+                        noise, "More samples, or a surface model in place of fibers"});
   }
   return warnings;
 }

@@ -1,10 +1,11 @@
 #ifndef HEDDLE_PIPELINE_WARNINGS_H_
 #define HEDDLE_PIPELINE_WARNINGS_H_
-// Where a method is out of its depth: what a user should know before trusting a picture or a pack. Every limit below was
-// read from a measured error curve (docs/stability.md; tests/stability holds curve and limit against each other).
-// `heddle check` says what is true of a pack whatever is rendered from it; `render` and `run` say that and what is true of
-// the picture, and put it into the picture's report. A warning never changes a result or an exit status.
-// Tested in tests/pipeline/warnings_test.cpp.
+// Where a method is out of its depth: what a user should know before trusting a picture or a pack.
+// Every limit below was read from a measured error curve (docs/stability.md; tests/stability holds
+// curve and limit against each other). `heddle check` says what is true of a pack whatever is
+// rendered from it; `render` and `run` say that and what is true of the picture, and put it into
+// the picture's report. A warning never changes a result or an exit status. Tested in
+// tests/pipeline/warnings_test.cpp.
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -40,10 +41,11 @@ std::vector<Warning> read_warnings(const std::filesystem::path& path);
 
 // Transfer: cells of more mean free paths are visibly too dark and blocky.
 inline constexpr double kCellMeanFreePaths = 6;
-// Transfer without cones: light that spreads by less than this at every scattering keeps shapes that order 5 cannot hold.
+// Transfer without cones: light that spreads by less than this at every scattering keeps shapes
+// that order 5 cannot hold.
 inline constexpr double kParallelDegrees = 7;
-// Sums of Gaussians alone (on data for light from the face, and from both sides), and signed distances alone: the sharpness beyond
-// which, and below which, each is out of range.
+// Sums of Gaussians alone (on data for light from the face, and from both sides), and signed
+// distances alone: the sharpness beyond which, and below which, each is out of range.
 inline constexpr double kLobesSharpness = 200;
 inline constexpr double kSphereLobesSharpness = 30;
 inline constexpr double kDistanceSharpness = 3;
@@ -58,13 +60,15 @@ inline constexpr double kRimThicknesses = 1;
 inline constexpr double kRimShare = 0.2;
 // Light from behind, share of what the picture shows.
 inline constexpr double kBehindShare = 0.05;
-// Light from both sides: light this near to the plane of the cloth, for more than half of what the picture shows.
+// Light from both sides: light this near to the plane of the cloth, for more than half of what the
+// picture shows.
 inline constexpr double kPlaneDegrees = 8;
 // Tetrahedra without a picture (flipped, degenerate), share of all.
 inline constexpr double kHiddenTetShare = 0.005;
 // Negative light by ringing, share of multiple scattering.
 inline constexpr double kNegativeShare = 0.01;
-// Interactive surfaces: Gaussian lights softer than this, from which the weights do not come out of the integral.
+// Interactive surfaces: Gaussian lights softer than this, from which the weights do not come out of
+// the integral.
 inline constexpr double kInteractiveSharpness = 20;
 // Noise of pixels that cover more than a repeat.
 inline constexpr double kNoise = 0.1;
@@ -72,10 +76,13 @@ inline constexpr double kNoise = 0.1;
 /// What a pack's limits depend on.
 struct PackFacts {
   double mean_free_path_mm = 0;
-  double cell_mean_free_paths = 0;  // edge of as many cubes as there are cells; 0 without a transfer
+  // edge of as many cubes as there are cells; 0 without a transfer
+  double cell_mean_free_paths = 0;
   double neighbour_angle =
-      0;                  // radians: rms angle between the fibers within three mean free paths, median over segments
-  double lobe_width = 0;  // radians: the narrowest longitudinal lobe that carries a tenth of the light or more
+      // radians: rms angle between the fibers within three mean free paths, median over segments
+      0;
+  // radians: the narrowest longitudinal lobe that carries a tenth of the light or more
+  double lobe_width = 0;
 };
 PackFacts pack_facts(const FabricPack& pack, const TileScene& tile);
 

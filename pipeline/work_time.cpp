@@ -14,7 +14,8 @@ double processor_seconds() {
 
 }  // namespace
 
-Stopwatch::Stopwatch() : start_(std::chrono::steady_clock::now()), core_start_(processor_seconds()) {}
+Stopwatch::Stopwatch()
+    : start_(std::chrono::steady_clock::now()), core_start_(processor_seconds()) {}
 
 WorkTime Stopwatch::elapsed() const {
   return {std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(),
@@ -22,7 +23,8 @@ WorkTime Stopwatch::elapsed() const {
 }
 
 int working_threads() {
-  return static_cast<int>(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
+  return static_cast<int>(
+      tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
 }
 
 }  // namespace heddle

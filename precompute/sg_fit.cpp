@@ -23,11 +23,13 @@ SgVisibility fit_sgs(const VisibilityMaps& maps, const VisibilitySettings& setti
     RandomStream random(settings.seed, RandomStage::kVisibility, s, 0);
     const auto turned_columns = static_cast<int>(random.index(VisibilityMaps::kResolution));
     const SphericalMap map = maps.map(s);
-    visibility.rotation[s] = half_from_float(static_cast<float>(turned_columns * map.grid().column_step()));
+    visibility.rotation[s] =
+        half_from_float(static_cast<float>(turned_columns * map.grid().column_step()));
     if (maps.sees_nothing[s] != 0) return;
     const Eigen::VectorXd weights = fit.weights(map, turned_columns);
     for (std::size_t q = 0; q < lobes; ++q) {
-      visibility.weights[s * lobes + q] = half_from_float(static_cast<float>(weights[static_cast<Eigen::Index>(q)]));
+      visibility.weights[s * lobes + q] =
+          half_from_float(static_cast<float>(weights[static_cast<Eigen::Index>(q)]));
     }
   });
   return visibility;

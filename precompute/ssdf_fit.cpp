@@ -19,21 +19,25 @@ constexpr int kN = VisibilityMaps::kResolution;
 // Rows below the horizon that are fitted although nothing is open there.
 constexpr int kMarginRows = 2;
 
-// Subspace iteration: vectors beyond those asked for, and rounds. The error of a component falls per round by
-// the ratio of its variance to that of the first one left out.
+// Subspace iteration: vectors beyond those asked for, and rounds. The error of a component falls
+// per round by the ratio of its variance to that of the first one left out.
 constexpr Eigen::Index kExtraVectors = 16;
 constexpr int kRounds = 20;
 
-// A component whose standard deviation is below this share of the first's is left out (rounding noise).
+// A component whose standard deviation is below this share of the first's is left out (rounding
+// noise).
 constexpr double kSmallestComponent = 1e-5;
 
-using Samples = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;  // [segment][cell]
+// [segment][cell]
+using Samples = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 /// Segments that see something, `count` of them at random; all where there are no more. Ascending.
-std::vector<std::uint32_t> choose_segments(const VisibilityMaps& maps, std::size_t count, std::uint64_t seed) {
+std::vector<std::uint32_t> choose_segments(const VisibilityMaps& maps, std::size_t count,
+                                           std::uint64_t seed) {
   std::vector<std::pair<std::uint64_t, std::uint32_t>> drawn;
   for (std::uint32_t s = 0; s < maps.count(); ++s) {
-    if (maps.sees_nothing[s] == 0) drawn.emplace_back(RandomStream(seed, RandomStage::kPca, s, 0).bits(), s);
+    if (maps.sees_nothing[s] == 0)
+      drawn.emplace_back(RandomStream(seed, RandomStage::kPca, s, 0).bits(), s);
   }
   std::sort(drawn.begin(), drawn.end());
   drawn.resize(std::min(count, drawn.size()));
@@ -57,13 +61,15 @@ class LimitedDistance {
   SignedDistanceTransform transform_;
 };
 
-/// The leading `count` eigenvectors of a positive semidefinite matrix, and their eigenvalues, largest first.
-std::pair<Eigen::MatrixXd, Eigen::VectorXd> leading_eigenvectors(const Eigen::MatrixXd& matrix, Eigen::Index count,
+/// The leading `count` eigenvectors of a positive semidefinite matrix, and their eigenvalues,
+/// largest first.
+std::pair<Eigen::MatrixXd, Eigen::VectorXd> leading_eigenvectors(const Eigen::MatrixXd& matrix,
+                                                                 Eigen::Index count,
                                                                  std::uint64_t seed) {
   const Eigen::Index vectors = std::min(count + kExtraVectors, matrix.rows());
   RandomStream random(seed, RandomStage::kPca, 0, 1);
-  Eigen::MatrixXd basis =
-      Eigen::MatrixXd::NullaryExpr(matrix.rows(), vectors, [&] { return random.uniform_double() - 0.5; });
+  Eigen::MatrixXd basis = Eigen::MatrixXd::NullaryExpr(
+      matrix.rows(), vectors, [&] { return random.uniform_double() - 0.5; });
   Eigen::MatrixXd orthonormal;
   for (int round = 0; round < kRounds; ++round) {
     const Eigen::HouseholderQR<Eigen::MatrixXd> qr(basis);
@@ -103,16 +109,19 @@ SsdfVisibility fit_ssdf(const VisibilityMaps& maps, const VisibilitySettings& se
   tbb::parallel_for(Eigen::Index{0}, count, [&](Eigen::Index i) {
     std::vector<float> distance;
     limited_distance(maps.map(chosen[static_cast<std::size_t>(i)]), distance);
-    samples.row(i) = Eigen::Map<const Eigen::RowVectorXf>(distance.data(), static_cast<Eigen::Index>(all_cells));
+    samples.row(i) =
+        Eigen::Map<const Eigen::RowVectorXf>(distance.data(), static_cast<Eigen::Index>(all_cells));
   });
-  const Eigen::RowVectorXf mean = (samples.cast<double>().colwise().sum() / static_cast<double>(count)).cast<float>();
+  const Eigen::RowVectorXf mean =
+      (samples.cast<double>().colwise().sum() / static_cast<double>(count)).cast<float>();
   std::copy(mean.data(), mean.data() + all_cells, ssdf.mean.begin());
 
   // Principal components of the weighted deviations, by way of their products with each other.
   const LatLongGrid grid(kN);
   Eigen::RowVectorXf root_weight(cells);
   for (Eigen::Index cell = 0; cell < cells; ++cell) {
-    root_weight[cell] = static_cast<float>(std::sqrt(grid.solid_angle(static_cast<int>(cell / kN))));
+    root_weight[cell] =
+        static_cast<float>(std::sqrt(grid.solid_angle(static_cast<int>(cell / kN))));
   }
   Samples weighted = samples.leftCols(cells);
   samples.resize(0, 0);
@@ -121,14 +130,15 @@ SsdfVisibility fit_ssdf(const VisibilityMaps& maps, const VisibilitySettings& se
   Eigen::MatrixXf products = Eigen::MatrixXf::Zero(count, count);
   products.selfadjointView<Eigen::Lower>().rankUpdate(weighted);
   products.triangularView<Eigen::StrictlyUpper>() = products.transpose();
-  const auto [vectors, variances] =
-      leading_eigenvectors(products.cast<double>(), static_cast<Eigen::Index>(components), settings.seed);
+  const auto [vectors, variances] = leading_eigenvectors(
+      products.cast<double>(), static_cast<Eigen::Index>(components), settings.seed);
 
   // Unit components, [cell][component]: what reconstructs the distance, and what projects on it.
   Samples projection = Samples::Zero(cells, static_cast<Eigen::Index>(components));
   for (Eigen::Index k = 0; k < vectors.cols(); ++k) {
     if (variances[k] <= kSmallestComponent * kSmallestComponent * variances[0]) break;
-    const Eigen::VectorXf unit = weighted.transpose() * (vectors.col(k) / std::sqrt(variances[k])).cast<float>().eval();
+    const Eigen::VectorXf unit =
+        weighted.transpose() * (vectors.col(k) / std::sqrt(variances[k])).cast<float>().eval();
     for (Eigen::Index cell = 0; cell < cells; ++cell) {
       ssdf.basis[static_cast<std::size_t>(cell) * components + static_cast<std::size_t>(k)] =
           unit[cell] / root_weight[cell];
@@ -145,7 +155,8 @@ SsdfVisibility fit_ssdf(const VisibilityMaps& maps, const VisibilitySettings& se
     for (Eigen::Index row = 0, cell = 0; row < rows; ++row) {
       row_sum.setZero();
       for (int column = 0; column < kN; ++column, ++cell) {
-        row_sum += (distance[static_cast<std::size_t>(cell)] - mean[cell]) * projection.row(cell).transpose();
+        row_sum += (distance[static_cast<std::size_t>(cell)] - mean[cell]) *
+                   projection.row(cell).transpose();
       }
       sum += row_sum;
     }

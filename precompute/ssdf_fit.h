@@ -1,13 +1,16 @@
 #ifndef HEDDLE_PRECOMPUTE_SSDF_FIT_H_
 #define HEDDLE_PRECOMPUTE_SSDF_FIT_H_
-// Visibility maps -> signed distance functions compressed by principal components (Khungurn 2017, section 4.1).
+// Visibility maps -> signed distance functions compressed by principal components (Khungurn 2017,
+// section 4.1).
 //
-// Distances are to the edges of cells (fibers/math/signed_distance.h) and limited to +-kLargestDistance before the fit:
-// neither the sign nor the error function of a light of sharpness >= 100 sees more, and the components are left to describe
-// where the edge is (figures in docs/performance.md). Components are computed from a random subset of the segments that
-// see something, each cell weighted by its solid angle. With light from the face only they span the upper half and two
-// rows below it, which interpolation at the horizon touches; farther below, the distance is the mean. The chosen subset,
-// the order of every sum and so the result depend on the seed alone. Tested in tests/precompute/ssdf_fit_test.cpp.
+// Distances are to the edges of cells (fibers/math/signed_distance.h) and limited to
+// +-kLargestDistance before the fit: neither the sign nor the error function of a light of
+// sharpness >= 100 sees more, and the components are left to describe where the edge is (figures in
+// docs/performance.md). Components are computed from a random subset of the segments that see
+// something, each cell weighted by its solid angle. With light from the face only they span the
+// upper half and two rows below it, which interpolation at the horizon touches; farther below, the
+// distance is the mean. The chosen subset, the order of every sum and so the result depend on the
+// seed alone. Tested in tests/precompute/ssdf_fit_test.cpp.
 
 #include "fibers/baked/segment_visibility.h"
 #include "precompute/visibility_maps.h"

@@ -31,10 +31,12 @@ using RowMajorMatrix = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eige
 TransferSettings read_transfer_settings(const TomlTable& section) {
   TransferSettings settings;
   settings.order = static_cast<int>(section.integer("order", 0, 5, 5));
-  settings.cell_mean_free_paths = section.number("cell_mean_free_paths", {.min = 0.25, .max = 100}, 4.0);
+  settings.cell_mean_free_paths =
+      section.number("cell_mean_free_paths", {.min = 0.25, .max = 100}, 4.0);
   settings.min_paths = static_cast<int>(section.integer("min_paths", 1, 100'000'000, 4096));
   settings.max_paths = static_cast<int>(section.integer("max_paths", 1, 100'000'000, 32768));
-  if (settings.max_paths < settings.min_paths) section.fail("max_paths", "expected at least min_paths");
+  if (settings.max_paths < settings.min_paths)
+    section.fail("max_paths", "expected at least min_paths");
   const std::string cones = section.choice("cones", {"auto", "on", "off"}, "auto");
   settings.cones = cones == "auto" ? TransferSettings::Cones::kAuto
                    : cones == "on" ? TransferSettings::Cones::kOn
@@ -46,14 +48,16 @@ TransferSettings read_transfer_settings(const TomlTable& section) {
 bool keeps_light_on_cones(const Exemplar& exemplar, std::span<const Vec3> bundle_tangent) {
   constexpr double kNarrowLobe = 3 * kPi / 180;
   constexpr double kParallel = 4 * kPi / 180;
-  const bool narrow = std::any_of(exemplar.scattering.begin(), exemplar.scattering.end(), [](const FiberScattering& fiber) {
-    return !fiber.isotropic_white && std::min(fiber.beta_r, fiber.beta_tt) < kNarrowLobe;
-  });
+  const bool narrow = std::any_of(
+      exemplar.scattering.begin(), exemplar.scattering.end(), [](const FiberScattering& fiber) {
+        return !fiber.isotropic_white && std::min(fiber.beta_r, fiber.beta_tt) < kNarrowLobe;
+      });
   return narrow && bundle_spread(exemplar, bundle_tangent) < kParallel;
 }
 
 TransferBaker::TransferBaker(const TileScene& scene, std::span<const BcsdfTable> materials,
-                             const SegmentOrigins& origins, const TransferSettings& settings, const SegmentCells& cells)
+                             const SegmentOrigins& origins, const TransferSettings& settings,
+                             const SegmentCells& cells)
     : scene_(&scene),
       materials_(materials),
       origins_(&origins),
@@ -62,7 +66,8 @@ TransferBaker::TransferBaker(const TileScene& scene, std::span<const BcsdfTable>
       cells_(cells.count) {
   if (settings.cones != TransferSettings::Cones::kOff) {
     bundle_tangent_ = bundle_tangents(scene.exemplar());
-    if (settings.cones == TransferSettings::Cones::kAuto && !keeps_light_on_cones(scene.exemplar(), bundle_tangent_)) {
+    if (settings.cones == TransferSettings::Cones::kAuto &&
+        !keeps_light_on_cones(scene.exemplar(), bundle_tangent_)) {
       bundle_tangent_.clear();
     }
   }
@@ -87,7 +92,8 @@ void TransferBaker::bake_cell(std::uint32_t cell, const CellResult& result) cons
   RowMajorMatrix incoming(kBatch, 3 * n);  // throughput x Y_j1(w1)
   constexpr int kConeColumns = ConeTransfer::kWidths * ConeTransfer::kAzimuths * 3;
   const bool with_cones = !bundle_tangent_.empty();
-  RowMajorMatrix on_cones(with_cones ? kBatch : 0, kConeColumns);  // throughput x F_m(phi) of the path's width
+  // throughput x F_m(phi) of the path's width
+  RowMajorMatrix on_cones(with_cones ? kBatch : 0, kConeColumns);
   Eigen::ArrayXXd harmonics_sum = Eigen::ArrayXXd::Zero(n, 3 * n);
   Eigen::ArrayXXd moments_sum = Eigen::ArrayXXd::Zero(n, kConeColumns);
   std::vector<float> y1(static_cast<std::size_t>(n));
@@ -99,12 +105,15 @@ void TransferBaker::bake_cell(std::uint32_t cell, const CellResult& result) cons
     int narrow = 0;
     int wide = 0;
     for (int i = 0; i < kBatch; ++i) {
-      const auto path = static_cast<std::uint64_t>(batches) * kBatch + static_cast<std::uint64_t>(i);
+      const auto path =
+          static_cast<std::uint64_t>(batches) * kBatch + static_cast<std::uint64_t>(i);
       RandomStream random(settings_.seed, RandomStage::kTransfer, cell, path);
       const double share = std::fmod((static_cast<double>(path) + 0.5) * kGoldenShare, 1.0);
-      const auto chosen = std::upper_bound(cumulative_openness.begin(), cumulative_openness.end() - 1,
-                                           share * cumulative_openness.back());
-      const std::uint32_t segment = segments[static_cast<std::size_t>(chosen - cumulative_openness.begin())];
+      const auto chosen =
+          std::upper_bound(cumulative_openness.begin(), cumulative_openness.end() - 1,
+                           share * cumulative_openness.back());
+      const std::uint32_t segment =
+          segments[static_cast<std::size_t>(chosen - cumulative_openness.begin())];
       const float z = 1 - 2 * (static_cast<float>(i / kStrata) + random.uniform()) / kStrata;
       const float phi = 2 * kPif * (static_cast<float>(i % kStrata) + random.uniform()) / kStrata;
       const float r = std::sqrt(std::max(0.0F, 1 - z * z));
@@ -113,27 +122,30 @@ void TransferBaker::bake_cell(std::uint32_t cell, const CellResult& result) cons
       const auto first = trace.next(trace.at(origins_->position[segment], segment), w1);
       if (!first) continue;
       float bundle_variance = 0;
-      const auto escape = walk_path(trace, materials_, *first, -w1, Rgb::Ones(), random, limits,
-                                    [&](const auto& vertex, const Mat3&, const Vec3&, const Rgb&, int) {
-                                      if (with_cones) {
-                                        bundle_variance += vertex.tangent.cross(bundle_tangent_[segment]).squaredNorm();
-                                      }
-                                      return true;
-                                    });
+      const auto escape = walk_path(
+          trace, materials_, *first, -w1, Rgb::Ones(), random, limits,
+          [&](const auto& vertex, const Mat3&, const Vec3&, const Rgb&, int) {
+            if (with_cones) {
+              bundle_variance += vertex.tangent.cross(bundle_tangent_[segment]).squaredNorm();
+            }
+            return true;
+          });
       if (!escape || (!settings_.both_sides && escape->direction.z() <= 0)) continue;
-      const int width =
-          with_cones ? ConeTransfer::width_of(escape->variance + bundle_variance) : ConeTransfer::kWidths;
+      const int width = with_cones ? ConeTransfer::width_of(escape->variance + bundle_variance)
+                                   : ConeTransfer::kWidths;
       const bool on_cone = width < ConeTransfer::kWidths;
       const int row = on_cone ? narrow++ : kBatch - 1 - wide++;
       evaluate_sh(settings_.order, escape->direction, light.row(row).data());
       evaluate_sh(settings_.order, w1, y1.data());
       for (int j = 0; j < n; ++j) {
-        for (int c = 0; c < 3; ++c) incoming(row, 3 * j + c) = escape->throughput[c] * y1[static_cast<std::size_t>(j)];
+        for (int c = 0; c < 3; ++c)
+          incoming(row, 3 * j + c) = escape->throughput[c] * y1[static_cast<std::size_t>(j)];
       }
       if (!on_cone) continue;
       const Vec3 about = cone_frame(bundle_tangent_[segment]) * w1;
       const float across = std::hypot(about.y(), about.z());
-      const auto azimuths = azimuth_harmonics(across > 0 ? about.y() / across : 1.0F, across > 0 ? about.z() / across : 0.0F);
+      const auto azimuths = azimuth_harmonics(across > 0 ? about.y() / across : 1.0F,
+                                              across > 0 ? about.z() / across : 0.0F);
       for (int m = 0; m < ConeTransfer::kAzimuths; ++m) {
         for (int c = 0; c < 3; ++c) {
           on_cones(row, 3 * (width * ConeTransfer::kAzimuths + m) + c) =
@@ -142,13 +154,17 @@ void TransferBaker::bake_cell(std::uint32_t cell, const CellResult& result) cons
       }
     }
     constexpr double kScale = 4 * kPi / kBatch;
-    Eigen::ArrayXXd mean = (light.bottomRows(wide).transpose() * incoming.bottomRows(wide)).array().cast<double>() * kScale;
+    Eigen::ArrayXXd mean =
+        (light.bottomRows(wide).transpose() * incoming.bottomRows(wide)).array().cast<double>() *
+        kScale;
     if (narrow > 0) {
       const Eigen::ArrayXXd part =
-          (light.topRows(narrow).transpose() * incoming.topRows(narrow)).array().cast<double>() * kScale;
+          (light.topRows(narrow).transpose() * incoming.topRows(narrow)).array().cast<double>() *
+          kScale;
       harmonics_sum += part;
       moments_sum +=
-          (light.topRows(narrow).transpose() * on_cones.topRows(narrow)).array().cast<double>() * kScale;
+          (light.topRows(narrow).transpose() * on_cones.topRows(narrow)).array().cast<double>() *
+          kScale;
       mean += part;
     }
     sum += mean;
@@ -164,13 +180,15 @@ void TransferBaker::bake_cell(std::uint32_t cell, const CellResult& result) cons
     const double brightest = average.row(0).head<3>().maxCoeff();
     if (!last && squared_error.mean() > std::pow(settings_.target_error * brightest, 2)) continue;
     for (int j0 = 0; j0 < n; ++j0) {
-      for (int k = 0; k < 3 * n; ++k) result.matrix[j0 * 3 * n + k] = static_cast<float>(average(j0, k));
+      for (int k = 0; k < 3 * n; ++k)
+        result.matrix[j0 * 3 * n + k] = static_cast<float>(average(j0, k));
     }
     if (with_cones) {
       constexpr int kWidthColumns = 3 * ConeTransfer::kAzimuths;
       for (int j0 = 0; j0 < n; ++j0) {
         for (int k = 0; k < 3 * n; ++k) {
-          result.cone_harmonics[j0 * 3 * n + k] = static_cast<float>(harmonics_sum(j0, k) / batches);
+          result.cone_harmonics[j0 * 3 * n + k] =
+              static_cast<float>(harmonics_sum(j0, k) / batches);
         }
         for (int k = 0; k < kConeColumns; ++k) {
           const int width = k / kWidthColumns;
@@ -182,7 +200,8 @@ void TransferBaker::bake_cell(std::uint32_t cell, const CellResult& result) cons
     for (int l = 0; l <= settings_.order; ++l) {
       for (int c = 0; c < 3; ++c) {
         double band = 0;
-        for (int j1 = l * l; j1 < (l + 1) * (l + 1); ++j1) band += squared_error.col(3 * j1 + c).sum();
+        for (int j1 = l * l; j1 < (l + 1) * (l + 1); ++j1)
+          band += squared_error.col(3 * j1 + c).sum();
         result.standard_error[3 * l + c] = static_cast<float>(std::sqrt(band / (n * (2 * l + 1))));
       }
     }
@@ -204,13 +223,15 @@ TransferChunk TransferBaker::bake(std::uint32_t first_cell, std::uint32_t last_c
   chunk.paths.resize(count);
   const std::size_t moments = ConeTransfer::kWidths * n * ConeTransfer::kAzimuths * 3;
   if (!bundle_tangent_.empty()) {
-    chunk.cones = ConeTransfer{std::vector<float>(count * matrix), std::vector<float>(count * moments)};
+    chunk.cones =
+        ConeTransfer{std::vector<float>(count * matrix), std::vector<float>(count * moments)};
   }
   tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
-    bake_cell(first_cell + static_cast<std::uint32_t>(i),
-              {chunk.matrices.data() + i * matrix, chunk.standard_error.data() + i * bands, chunk.paths.data() + i,
-               chunk.cones ? chunk.cones->harmonics.data() + i * matrix : nullptr,
-               chunk.cones ? chunk.cones->moments.data() + i * moments : nullptr});
+    bake_cell(
+        first_cell + static_cast<std::uint32_t>(i),
+        {chunk.matrices.data() + i * matrix, chunk.standard_error.data() + i * bands,
+         chunk.paths.data() + i, chunk.cones ? chunk.cones->harmonics.data() + i * matrix : nullptr,
+         chunk.cones ? chunk.cones->moments.data() + i * moments : nullptr});
   });
   return chunk;
 }

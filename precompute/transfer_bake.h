@@ -1,18 +1,21 @@
 #ifndef HEDDLE_PRECOMPUTE_TRANSFER_BAKE_H_
 #define HEDDLE_PRECOMPUTE_TRANSFER_BAKE_H_
-// Estimates the indirect light transfer (IIRTF) of every cell by light paths on the endless flat cloth.
+// Estimates the indirect light transfer (IIRTF) of every cell by light paths on the endless flat
+// cloth.
 //
-// A path leaves a segment's origin (fibers/tracing/segment_origins.h) towards a uniform direction w1; if it hits a fiber it scatters by BCSDF sampling until
-// it leaves the cloth in direction w0, and adds 4 pi * throughput * Y_j0(w0) * Y_j1(w1) to a[j0][j1] of the segment's cell.
-// Light from the face only: paths that leave with w0.z <= 0 are dropped. One path so serves every light direction, where
-// the estimator of Khungurn 2017, section 4.2 (w0 and w1 both uniform) serves one and pays for narrow lobes with noise;
-// tests/bench/transfer_estimators.cpp holds both.
-// Within a cell, segments are chosen by their openness, the share of the sky they see: the cell's matrix is the mean over what
-// an eye can see of the cell, not over all it holds. The paper's plain mean mixes hidden segments in and darkens large cells.
-// Paths come in batches, stratified over w1 and over the cell's segments; the spread of the batch means gives the
-// standard error, and a cell is done when its error meets the target.
-// Cells are independent and draw from (seed, cell, path), so any range of cells can be baked alone, by any number of
-// threads, with the same result. Tested in tests/precompute/transfer_bake_test.cpp.
+// A path leaves a segment's origin (fibers/tracing/segment_origins.h) towards a uniform direction
+// w1; if it hits a fiber it scatters by BCSDF sampling until it leaves the cloth in direction w0,
+// and adds 4 pi * throughput * Y_j0(w0) * Y_j1(w1) to a[j0][j1] of the segment's cell. Light from
+// the face only: paths that leave with w0.z <= 0 are dropped. One path so serves every light
+// direction, where the estimator of Khungurn 2017, section 4.2 (w0 and w1 both uniform) serves one
+// and pays for narrow lobes with noise; tests/bench/transfer_estimators.cpp holds both. Within a
+// cell, segments are chosen by their openness, the share of the sky they see: the cell's matrix is
+// the mean over what an eye can see of the cell, not over all it holds. The paper's plain mean
+// mixes hidden segments in and darkens large cells. Paths come in batches, stratified over w1 and
+// over the cell's segments; the spread of the batch means gives the standard error, and a cell is
+// done when its error meets the target. Cells are independent and draw from (seed, cell, path), so
+// any range of cells can be baked alone, by any number of threads, with the same result. Tested in
+// tests/precompute/transfer_bake_test.cpp.
 
 #include <cstdint>
 #include <optional>
@@ -33,9 +36,11 @@ struct TransferSettings {
   double cell_mean_free_paths = 1;  // as many cells as cubes of this edge, in mean free paths
   int min_paths = 0;                // per cell, rounded up to whole batches
   int max_paths = 0;
-  double target_error = 0;          // rms standard error of the matrix' entries relative to a[0][0], brightest colour
+  // rms standard error of the matrix' entries relative to a[0][0], brightest colour
+  double target_error = 0;
   enum class Cones : std::uint8_t { kAuto, kOn, kOff };
-  Cones cones = Cones::kAuto;  // whether light that stays on cones is kept apart (fibers/baked/cone_transfer.h)
+  // whether light that stays on cones is kept apart (fibers/baked/cone_transfer.h)
+  Cones cones = Cones::kAuto;
   bool both_sides = false;
   std::uint64_t seed = 1;
 };
@@ -43,9 +48,10 @@ struct TransferSettings {
 /// Reads the section [transfer]; both_sides and seed are the fabric's.
 TransferSettings read_transfer_settings(const TomlTable& section);
 
-/// Whether `Cones::kAuto` keeps cones apart: where some fiber scatters into a lobe narrower than 3 degrees, and fibers lie within 4 degrees of their
-/// bundles (rms). Silk filaments do (2.7); in spun yarns (cotton 5.0, wool 7.6) wander widens light beyond what order 5 blurs, and cones change
-/// nothing there.
+/// Whether `Cones::kAuto` keeps cones apart: where some fiber scatters into a lobe narrower than 3
+/// degrees, and fibers lie within 4 degrees of their bundles (rms). Silk filaments do (2.7); in
+/// spun yarns (cotton 5.0, wool 7.6) wander widens light beyond what order 5 blurs, and cones
+/// change nothing there.
 bool keeps_light_on_cones(const Exemplar& exemplar, std::span<const Vec3> bundle_tangent);
 
 /// Added to each segment's openness, so that hidden segments are only rarely, not never, chosen.
@@ -64,8 +70,9 @@ class TransferBaker {
   static constexpr int kBatch = 1024;  // paths per batch
 
   /// All that is passed by reference must outlive the baker.
-  TransferBaker(const TileScene& scene, std::span<const BcsdfTable> materials, const SegmentOrigins& origins,
-                const TransferSettings& settings, const SegmentCells& cells);
+  TransferBaker(const TileScene& scene, std::span<const BcsdfTable> materials,
+                const SegmentOrigins& origins, const TransferSettings& settings,
+                const SegmentCells& cells);
 
   /// Cells first .. last - 1, in parallel.
   TransferChunk bake(std::uint32_t first_cell, std::uint32_t last_cell) const;

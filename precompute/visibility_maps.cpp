@@ -16,9 +16,9 @@ namespace {
 constexpr int kN = VisibilityMaps::kResolution;
 constexpr std::size_t kCells = static_cast<std::size_t>(kN) * kN;
 
-// A piece of fiber is projected with its squared radius smaller by this share: far above the rounding of the
-// test below for pieces up to kFarthest radii away, so that a cell is never closed whose ray would pass. The
-// ring of cells left out is traced.
+// A piece of fiber is projected with its squared radius smaller by this share: far above the
+// rounding of the test below for pieces up to kFarthest radii away, so that a cell is never closed
+// whose ray would pass. The ring of cells left out is traced.
 constexpr float kRadiusMargin = 2e-3F;
 
 // Pieces farther away, in radii, subtend less than a cell: a ray each is cheaper.
@@ -52,7 +52,8 @@ struct Directions {
   }
 
   Vec3 of(std::size_t row, std::size_t column) const {
-    return {sin_polar[row] * cos_azimuth[column], sin_polar[row] * sin_azimuth[column], cos_polar[row]};
+    return {sin_polar[row] * cos_azimuth[column], sin_polar[row] * sin_azimuth[column],
+            cos_polar[row]};
   }
 };
 
@@ -60,7 +61,10 @@ struct Directions {
 class MapTracer {
  public:
   MapTracer(const TileScene& scene, const Directions& directions, bool both_sides)
-      : scene_(&scene), directions_(&directions), rows_(both_sides ? kN : kN / 2), closed_(kCells) {}
+      : scene_(&scene),
+        directions_(&directions),
+        rows_(both_sides ? kN : kN / 2),
+        closed_(kCells) {}
 
   /// Writes the bits of open cells; returns whether there are any.
   bool trace(std::uint32_t segment, const Vec3& origin, std::uint64_t* words) {
@@ -86,13 +90,15 @@ class MapTracer {
   }
 
  private:
-  /// Projects the piece of fiber that was hit and its neighbours along the fiber while they look large.
+  /// Projects the piece of fiber that was hit and its neighbours along the fiber while they look
+  /// large.
   void project_around(const FiberHit& hit, const Vec3& direction) {
     const Exemplar& exemplar = scene_->exemplar();
     const std::uint32_t fiber = exemplar.segment_fiber[hit.segment];
     const std::uint32_t first = exemplar.first_point[fiber];
     const int pieces = static_cast<int>(exemplar.first_point[fiber + 1] - first) - 1;
-    const Vec3 period = exemplar.points[first + static_cast<std::uint32_t>(pieces)] - exemplar.points[first];
+    const Vec3 period =
+        exemplar.points[first + static_cast<std::uint32_t>(pieces)] - exemplar.points[first];
     const float radius = exemplar.radius_mm[fiber];
     // The copy of the tile that was hit: its segment is the one near the hit.
     const Vec3 offset = origin_ + hit.t * direction - exemplar.segment_midpoint(hit.segment);
@@ -100,7 +106,8 @@ class MapTracer {
                     std::round(offset.y() / exemplar.height_mm) * exemplar.height_mm, 0);
     const int hit_piece = static_cast<int>(exemplar.segment_point[hit.segment] - first);
     for (const int step : {1, -1}) {
-      for (int piece = step > 0 ? hit_piece : hit_piece - 1; std::abs(piece - hit_piece) < pieces; piece += step) {
+      for (int piece = step > 0 ? hit_piece : hit_piece - 1; std::abs(piece - hit_piece) < pieces;
+           piece += step) {
         const int turns = piece >= 0 ? piece / pieces : -((pieces - 1 - piece) / pieces);
         const auto point = first + static_cast<std::uint32_t>(piece - turns * pieces);
         const Vec3 shift = copy + static_cast<float>(turns) * period - origin_;
@@ -115,8 +122,8 @@ class MapTracer {
     }
   }
 
-  /// Closes the cells whose ray passes a capsule's axis (begin and end relative to the origin) within its
-  /// radius.
+  /// Closes the cells whose ray passes a capsule's axis (begin and end relative to the origin)
+  /// within its radius.
   void project(const Vec3& begin, const Vec3& end, float radius) {
     const Vec3 axis = end - begin;
     const Vec3 moment = begin.cross(axis);
@@ -161,11 +168,13 @@ class MapTracer {
         const float along = sine * axis_flat[c] + axis_up;
         const float to_end = to_begin + along;
         const float skew = sine * moment_flat[c] + moment_up;
-        // Nearest approach of the ray's line and the axis' line: at share s = numerator / denominator of the
-        // axis, at distance |skew| / sqrt(denominator), ahead of the origin where to_begin + s along > 0.
+        // Nearest approach of the ray's line and the axis' line: at share s = numerator /
+        // denominator of the axis, at distance |skew| / sqrt(denominator), ahead of the origin
+        // where to_begin + s along > 0.
         const float denominator = axis_axis - along * along;
         const float numerator = to_begin * along - begin_axis;
-        const int side = (skew * skew < square * denominator) & (numerator >= 0) & (numerator <= denominator) &
+        const int side = (skew * skew < square * denominator) & (numerator >= 0) &
+                         (numerator <= denominator) &
                          (to_begin * denominator + numerator * along > 0);
         const int begin_ball = (to_begin > 0) & (to_begin * to_begin > begin_free);
         const int end_ball = (to_end > 0) & (to_end * to_end > end_free);
@@ -204,8 +213,8 @@ void VisibilityMaps::append(const VisibilityMaps& next) {
   sees_nothing.insert(sees_nothing.end(), next.sees_nothing.begin(), next.sees_nothing.end());
 }
 
-VisibilityMaps bake_visibility_maps(const TileScene& scene, const SegmentOrigins& origins, bool both_sides,
-                                    std::uint32_t first, std::uint32_t last) {
+VisibilityMaps bake_visibility_maps(const TileScene& scene, const SegmentOrigins& origins,
+                                    bool both_sides, std::uint32_t first, std::uint32_t last) {
   assert(first <= last && last <= scene.exemplar().segment_count());
   assert(origins.position.size() == scene.exemplar().segment_count());
   static const Directions directions;
@@ -214,15 +223,16 @@ VisibilityMaps bake_visibility_maps(const TileScene& scene, const SegmentOrigins
   maps.both_sides = both_sides;
   maps.sees_nothing.resize(last - first);
   maps.words.resize(maps.count() * maps.words_per_map(), 0);
-  tbb::parallel_for(
-      tbb::blocked_range<std::size_t>(0, maps.count(), 16), [&](const tbb::blocked_range<std::size_t>& range) {
-        MapTracer tracer(scene, directions, both_sides);
-        for (std::size_t i = range.begin(); i < range.end(); ++i) {
-          const std::uint32_t segment = first + static_cast<std::uint32_t>(i);
-          const bool any_open = tracer.trace(segment, origins.position[segment], &maps.words[i * maps.words_per_map()]);
-          maps.sees_nothing[i] = any_open ? 0 : 1;
-        }
-      });
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, maps.count(), 16),
+                    [&](const tbb::blocked_range<std::size_t>& range) {
+                      MapTracer tracer(scene, directions, both_sides);
+                      for (std::size_t i = range.begin(); i < range.end(); ++i) {
+                        const std::uint32_t segment = first + static_cast<std::uint32_t>(i);
+                        const bool any_open = tracer.trace(segment, origins.position[segment],
+                                                           &maps.words[i * maps.words_per_map()]);
+                        maps.sees_nothing[i] = any_open ? 0 : 1;
+                      }
+                    });
   return maps;
 }
 
@@ -242,15 +252,17 @@ VisibilityMaps read_visibility_maps(const std::filesystem::path& path) {
   const TensorFile file = TensorFile::read(path);
   VisibilityMaps maps;
   const std::string& sides = file.metadata_value("light_from");
-  if (sides != "face" && sides != "both") throw FileError(path.string() + ": light_from is neither face nor both");
+  if (sides != "face" && sides != "both")
+    throw FileError(path.string() + ": light_from is neither face nor both");
   maps.both_sides = sides == "both";
   maps.first_segment = file.get<std::uint32_t>("first_segment", {1})[0];
   maps.words = file.get<std::uint64_t>("maps", {0, maps.words_per_map()});
   const std::size_t count = maps.words.size() / maps.words_per_map();
   for (std::size_t i = 0; i < count; ++i) {
     const auto begin = maps.words.begin() + static_cast<std::ptrdiff_t>(i * maps.words_per_map());
-    const bool closed = std::all_of(begin, begin + static_cast<std::ptrdiff_t>(maps.words_per_map()),
-                                    [](std::uint64_t word) { return word == 0; });
+    const bool closed =
+        std::all_of(begin, begin + static_cast<std::ptrdiff_t>(maps.words_per_map()),
+                    [](std::uint64_t word) { return word == 0; });
     maps.sees_nothing.push_back(closed ? 1 : 0);
   }
   return maps;

@@ -1,7 +1,7 @@
 #ifndef HEDDLE_PRECOMPUTE_VISIBILITY_SETTINGS_H_
 #define HEDDLE_PRECOMPUTE_VISIBILITY_SETTINGS_H_
-// What a fabric's section [visibility] says: how segment visibility is compressed. Keys, ranges and defaults:
-// configs/README.md. The resolution of the maps is fixed (VisibilityMaps::kResolution).
+// What a fabric's section [visibility] says: how segment visibility is compressed. Keys, ranges and
+// defaults: configs/README.md. The resolution of the maps is fixed (VisibilityMaps::kResolution).
 // Tested in tests/precompute/visibility_settings_test.cpp.
 
 #include <cstdint>
@@ -15,12 +15,13 @@ struct VisibilitySettings {
   int components = 48;      // principal components of the signed distance functions
   int pca_segments = 2048;  // segments, chosen at random, from which the components are computed
   SgSumShape sgs;           // the sum of spherical Gaussians
-  bool both_sides = false;  // light from the whole sphere; otherwise only from the face side (z > 0)
+  // light from the whole sphere; otherwise only from the face side (z > 0)
+  bool both_sides = false;
   std::uint64_t seed = 1;
 };
 
-/// Reads the section [visibility]; both_sides is the fabric's, and so is the seed, which the caller sets.
-/// Axes that cover the upper hemisphere only are an error where light comes from both sides.
+/// Reads the section [visibility]; both_sides is the fabric's, and so is the seed, which the caller
+/// sets. Axes that cover the upper hemisphere only are an error where light comes from both sides.
 VisibilitySettings read_visibility_settings(const TomlTable& section, bool both_sides);
 
 }  // namespace heddle

@@ -28,7 +28,8 @@ float squared_distance_to_segment(const Vec3& p, const Vec3& a, const Vec3& b) {
 
 VolumeSettings read_volume_settings(const TomlTable& section) {
   VolumeSettings settings;
-  settings.voxels_per_radius = section.number("voxels_per_radius", {0.1, 16}, settings.voxels_per_radius);
+  settings.voxels_per_radius =
+      section.number("voxels_per_radius", {0.1, 16}, settings.voxels_per_radius);
   return settings;
 }
 
@@ -53,7 +54,8 @@ IdVolume voxelize(const Exemplar& exemplar, const VolumeSettings& settings) {
     volume.voxel_mm[a] = extent[a] / voxels;
   }
   // Ids and distances here, the grid and its bytes when it is written.
-  require_memory(static_cast<std::uint64_t>(4 * sizeof(float) * count), fmt::format("a volume of {:.3g} voxels", count));
+  require_memory(static_cast<std::uint64_t>(4 * sizeof(float) * count),
+                 fmt::format("a volume of {:.3g} voxels", count));
   volume.ids.assign(static_cast<std::size_t>(count), -1);
   std::vector<float> nearest(volume.ids.size(),
                              std::numeric_limits<float>::infinity());  // squared, to the axis
@@ -76,11 +78,13 @@ IdVolume voxelize(const Exemplar& exemplar, const VolumeSettings& settings) {
     for (int z = low[2]; z <= high[2]; ++z) {
       for (int y = low[1]; y <= high[1]; ++y) {
         const std::size_t row =
-            (static_cast<std::size_t>(z) * volume.size[1] + wrap_index(y, volume.size[1])) * volume.size[0];
+            (static_cast<std::size_t>(z) * volume.size[1] + wrap_index(y, volume.size[1])) *
+            volume.size[0];
         for (int x = low[0]; x <= high[0]; ++x) {
-          const Vec3 centre(static_cast<float>(volume.origin_mm[0] + (x + 0.5) * volume.voxel_mm[0]),
-                            static_cast<float>(volume.origin_mm[1] + (y + 0.5) * volume.voxel_mm[1]),
-                            static_cast<float>(volume.origin_mm[2] + (z + 0.5) * volume.voxel_mm[2]));
+          const Vec3 centre(
+              static_cast<float>(volume.origin_mm[0] + (x + 0.5) * volume.voxel_mm[0]),
+              static_cast<float>(volume.origin_mm[1] + (y + 0.5) * volume.voxel_mm[1]),
+              static_cast<float>(volume.origin_mm[2] + (z + 0.5) * volume.voxel_mm[2]));
           const float squared = squared_distance_to_segment(centre, a, b);
           const std::size_t voxel = row + wrap_index(x, volume.size[0]);
           if (squared <= radius * radius && squared < nearest[voxel]) {

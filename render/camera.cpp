@@ -28,7 +28,8 @@ EyeRay Camera::ray(double x, double y) const {
 std::string Camera::world_to_camera_text() const {
   std::string text;
   for (const Vec3d& axis : {right_, up_, Vec3d(-forward_)}) {
-    text += fmt::format("{:.9g} {:.9g} {:.9g} {:.9g} ", axis.x(), axis.y(), axis.z(), -axis.dot(position_));
+    text += fmt::format("{:.9g} {:.9g} {:.9g} {:.9g} ", axis.x(), axis.y(), axis.z(),
+                        -axis.dot(position_));
   }
   return text + "0 0 0 1";
 }

@@ -1,7 +1,7 @@
 #ifndef HEDDLE_RENDER_CAMERA_H_
 #define HEDDLE_RENDER_CAMERA_H_
-// A pinhole camera in world space (millimetres). Pixel (0, 0) is at the top left; (x, y) = (0.5, 0.5) is its
-// centre. Tested in tests/render/camera_test.cpp.
+// A pinhole camera in world space (millimetres). Pixel (0, 0) is at the top left; (x, y) = (0.5,
+// 0.5) is its centre. Tested in tests/render/camera_test.cpp.
 
 #include <cstdint>
 #include <string>

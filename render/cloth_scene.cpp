@@ -8,7 +8,8 @@ namespace heddle {
 
 namespace {
 
-// Room above the highest and below the lowest fiber, in thicknesses: no fiber touches the shell's faces.
+// Room above the highest and below the lowest fiber, in thicknesses: no fiber touches the shell's
+// faces.
 constexpr double kShellMargin = 1e-3;
 // Distance of an underlay from the shell, in thicknesses.
 constexpr double kUnderlayGap = 1e-2;
@@ -63,7 +64,8 @@ ClothScene::ClothScene(std::vector<ClothPiece> pieces, std::vector<TriangleMesh>
           const auto [place, is_new] =
               offsets.try_emplace(piece.tile.get(), static_cast<std::uint16_t>(materials_.size()));
           if (is_new) {
-            materials_.insert(materials_.end(), exemplar.scattering.begin(), exemplar.scattering.end());
+            materials_.insert(materials_.end(), exemplar.scattering.begin(),
+                              exemplar.scattering.end());
           }
           Shell shell = make_shell(piece.mesh, exemplar);
           if (piece.underlay)
@@ -81,7 +83,8 @@ ClothScene::ClothScene(std::vector<ClothPiece> pieces, std::vector<TriangleMesh>
         return meshes;
       }()) {}
 
-std::optional<MeshHit> ClothScene::first_mesh(const Vec3d& origin, const Vec3& direction, double t_max) const {
+std::optional<MeshHit> ClothScene::first_mesh(const Vec3d& origin, const Vec3& direction,
+                                              double t_max) const {
   const std::optional<TriangleScene::Hit> hit =
       meshes_.intersect(origin.cast<float>(), direction, static_cast<float>(t_max));
   if (!hit) return {};
@@ -125,7 +128,8 @@ ClothScene::LocalRay ClothScene::local_ray(const ShellInterval& interval, const 
   const double height = exemplar.height_mm;
   origin.x() -= width * std::floor(origin.x() / width);
   origin.y() -= height * std::floor(origin.y() / height);
-  return {{origin.cast<float>(), direction.cast<float>(), 0.0F, static_cast<float>(1.0 + before + margin)},
+  return {{origin.cast<float>(), direction.cast<float>(), 0.0F,
+           static_cast<float>(1.0 + before + margin)},
           before};
 }
 
@@ -146,8 +150,9 @@ ClothScene make_cloth_scene(const SceneConfig& config,
   std::vector<ClothPiece> pieces;
   std::vector<SurfaceCloth> surfaces;
   for (const ClothConfig& cloth : config.cloths) {
-    ClothMesh mesh = cloth.mesh ? read_cloth_mesh(*cloth.mesh, cloth.uv_size_mm)
-                                : flat_cloth(cloth.flat_width_mm, cloth.flat_height_mm, flat_cells(cloth));
+    ClothMesh mesh = cloth.mesh
+                         ? read_cloth_mesh(*cloth.mesh, cloth.uv_size_mm)
+                         : flat_cloth(cloth.flat_width_mm, cloth.flat_height_mm, flat_cells(cloth));
     if (cloth.surface) {
       surfaces.emplace_back(cloth.surface->model, std::move(mesh));
     } else {

@@ -1,12 +1,13 @@
 #ifndef HEDDLE_RENDER_CLOTH_SCENE_H_
 #define HEDDLE_RENDER_CLOTH_SCENE_H_
-// All cloth and all meshes of a scene in world space (millimetres): rays through the shell maps against the
-// explicit fibers (or whatever a query finds in fabric space), and macroscopic visibility against shells and
-// meshes. Meshes are surface cloths and black meshes; fibers see both as black.
+// All cloth and all meshes of a scene in world space (millimetres): rays through the shell maps
+// against the explicit fibers (or whatever a query finds in fabric space), and macroscopic
+// visibility against shells and meshes. Meshes are surface cloths and black meshes; fibers see both
+// as black.
 //
-// Shells may overlap in space; a ray visits all of them. Only a ray that starts inside one shell does not see
-// what another shell holds around its very origin. Fabric coordinates are folded into the base tile in double
-// before they become floats. Tested in tests/render/cloth_scene_test.cpp.
+// Shells may overlap in space; a ray visits all of them. Only a ray that starts inside one shell
+// does not see what another shell holds around its very origin. Fabric coordinates are folded into
+// the base tile in double before they become floats. Tested in tests/render/cloth_scene_test.cpp.
 
 #include <algorithm>
 #include <atomic>
@@ -52,8 +53,8 @@ struct MeshHit {
   float u, v;  // as in TriangleScene::Hit
 };
 
-/// A ray through the scene; direction of unit length. It may start at a hit, whose fiber it then ignores
-/// until it has left that shell.
+/// A ray through the scene; direction of unit length. It may start at a hit, whose fiber it then
+/// ignores until it has left that shell.
 struct SceneRay {
   Vec3d origin;
   Vec3 direction;
@@ -78,21 +79,26 @@ class ClothScene {
   const Shell& shell(std::uint32_t cloth) const { return cloths_[cloth].shell; }
   const TileScene& tile(std::uint32_t cloth) const { return *cloths_[cloth].tile; }
   const Exemplar& exemplar(std::uint32_t cloth) const { return cloths_[cloth].tile->exemplar(); }
-  /// Materials of all fabrics in one list, each fabric once: a fiber's index is material_offset(cloth) + its
-  /// own.
-  std::uint16_t material_offset(std::uint32_t cloth) const { return cloths_[cloth].material_offset; }
+  /// Materials of all fabrics in one list, each fabric once: a fiber's index is
+  /// material_offset(cloth) + its own.
+  std::uint16_t material_offset(std::uint32_t cloth) const {
+    return cloths_[cloth].material_offset;
+  }
   std::vector<FiberScattering> materials() const { return materials_; }
 
-  /// First thing that `query` finds along the ray. query(cloth, ray, own_fiber) -> std::optional<FiberHit>
-  /// looks along a fabric-space ray from its origin to t_max (own_fiber is kNoFiber or the fiber to ignore).
+  /// First thing that `query` finds along the ray. query(cloth, ray, own_fiber) ->
+  /// std::optional<FiberHit> looks along a fabric-space ray from its origin to t_max (own_fiber is
+  /// kNoFiber or the fiber to ignore).
   template <class Query>
   std::optional<ShellHit> first_hit(const SceneRay& ray, RayReach reach, Query&& query) const;
 
   /// First fiber along the ray.
-  std::optional<ShellHit> first_fiber(const SceneRay& ray, RayReach reach = RayReach::kEverything) const {
-    return first_hit(ray, reach, [this](std::uint32_t cloth, const Ray& local, std::uint32_t own_fiber) {
-      return cloths_[cloth].tile->intersect(local, own_fiber);
-    });
+  std::optional<ShellHit> first_fiber(const SceneRay& ray,
+                                      RayReach reach = RayReach::kEverything) const {
+    return first_hit(ray, reach,
+                     [this](std::uint32_t cloth, const Ray& local, std::uint32_t own_fiber) {
+                       return cloths_[cloth].tile->intersect(local, own_fiber);
+                     });
   }
   /// Does the ray meet a fiber or a mesh?
   bool occluded(const SceneRay& ray) const;
@@ -105,7 +111,8 @@ class ClothScene {
   std::optional<MeshHit> first_mesh(const Vec3d& origin, const Vec3& direction,
                                     double t_max = std::numeric_limits<double>::infinity()) const;
 
-  /// Is a point of a shell's surface, or of a mesh, open towards `direction`, past all shells (as solids) and meshes?
+  /// Is a point of a shell's surface, or of a mesh, open towards `direction`, past all shells (as
+  /// solids) and meshes?
   bool globally_visible(const Shell::SurfacePoint& point, const Vec3& direction) const;
   /// The same past all fibers and meshes.
   bool visible(const Shell::SurfacePoint& point, const Vec3& direction) const;
@@ -115,9 +122,11 @@ class ClothScene {
     return shell(hit.cloth).surface_point(hit.tet / 3, hit.fabric.head<2>(), side);
   }
   /// The same over another fabric position near the hit; nothing beyond a rim.
-  std::optional<Shell::SurfacePoint> surface_point(const ShellHit& hit, const Eigen::Vector2d& fabric_xy,
+  std::optional<Shell::SurfacePoint> surface_point(const ShellHit& hit,
+                                                   const Eigen::Vector2d& fabric_xy,
                                                    ClothSide side) const {
-    const std::optional<std::uint32_t> triangle = shell(hit.cloth).find_triangle(hit.tet / 3, fabric_xy);
+    const std::optional<std::uint32_t> triangle =
+        shell(hit.cloth).find_triangle(hit.tet / 3, fabric_xy);
     if (!triangle) return {};
     return shell(hit.cloth).surface_point(*triangle, fabric_xy, side);
   }
@@ -128,7 +137,8 @@ class ClothScene {
   }
   /// Unit tangent of the hit fiber in world space.
   Vec3 world_tangent(const ShellHit& hit) const {
-    return (shell(hit.cloth).world_from_fabric(hit.tet) * exemplar(hit.cloth).segment_tangent(hit.segment))
+    return (shell(hit.cloth).world_from_fabric(hit.tet) *
+            exemplar(hit.cloth).segment_tangent(hit.segment))
         .normalized();
   }
 
@@ -144,8 +154,9 @@ class ClothScene {
     std::uint16_t material_offset;
   };
 
-  // The ray in fabric space over one interval: s = t - margin runs from 0 (t0) to 1 (t1). It is a little
-  // longer at the ends that are not the start of the ray, so that nothing falls between two tetrahedra.
+  // The ray in fabric space over one interval: s = t - margin runs from 0 (t0) to 1 (t1). It is a
+  // little longer at the ends that are not the start of the ray, so that nothing falls between two
+  // tetrahedra.
   struct LocalRay {
     Ray ray;
     double margin;
@@ -156,9 +167,9 @@ class ClothScene {
   static constexpr double kShortestMm = 1e-7;
   static constexpr double kMarginMm = 1e-6;
 
-  // Calls visit(cloth, interval, own_fiber) -> bool (true stops the walk through this shell) for the shells
-  // in order of where the ray enters them; `limit` may shrink meanwhile, and nothing that starts beyond it is
-  // visited.
+  // Calls visit(cloth, interval, own_fiber) -> bool (true stops the walk through this shell) for
+  // the shells in order of where the ray enters them; `limit` may shrink meanwhile, and nothing
+  // that starts beyond it is visited.
   template <class Visit>
   void walk(const SceneRay& ray, RayReach reach, const double& limit, Visit&& visit) const;
 
@@ -168,7 +179,7 @@ class ClothScene {
   std::vector<Cloth> cloths_;
   TriangleScene boundary_;  // mesh index = cloth
   std::vector<SurfaceCloth> surfaces_;
-  TriangleScene meshes_;    // the surfaces, then the black meshes
+  TriangleScene meshes_;  // the surfaces, then the black meshes
   mutable std::atomic<std::uint64_t> failed_walks_ = 0;
 };
 
@@ -177,7 +188,8 @@ ClothScene make_cloth_scene(const SceneConfig& config,
                             std::span<const std::shared_ptr<const TileScene>> tiles);
 
 template <class Visit>
-void ClothScene::walk(const SceneRay& ray, RayReach reach, const double& limit, Visit&& visit) const {
+void ClothScene::walk(const SceneRay& ray, RayReach reach, const double& limit,
+                      Visit&& visit) const {
   const Vec3d direction = ray.direction.cast<double>().normalized();
   const auto note = [this](Shell::WalkEnd end) {
     if (end == Shell::WalkEnd::kFailed) failed_walks_.fetch_add(1, std::memory_order_relaxed);
@@ -193,37 +205,42 @@ void ClothScene::walk(const SceneRay& ray, RayReach reach, const double& limit, 
     if (reach == RayReach::kOwnShell) return;
   }
   static thread_local std::vector<TriangleScene::Crossing> crossings;
-  boundary_.crossings(ray.origin.cast<float>(), ray.direction, static_cast<float>(limit), crossings);
+  boundary_.crossings(ray.origin.cast<float>(), ray.direction, static_cast<float>(limit),
+                      crossings);
   for (const TriangleScene::Crossing& crossing : crossings) {
     if (static_cast<double>(crossing.t) > limit) break;
     note(shell(crossing.mesh)
-             .walk_from_face(ray.origin, direction, crossing.triangle, [&](const ShellInterval& interval) {
-               return interval.t0 > limit ||
-                      (interval.t1 - interval.t0 > kShortestMm && visit(crossing.mesh, interval, kNoFiber));
-             }));
+             .walk_from_face(
+                 ray.origin, direction, crossing.triangle, [&](const ShellInterval& interval) {
+                   return interval.t0 > limit || (interval.t1 - interval.t0 > kShortestMm &&
+                                                  visit(crossing.mesh, interval, kNoFiber));
+                 }));
   }
 }
 
 template <class Query>
-std::optional<ShellHit> ClothScene::first_hit(const SceneRay& ray, RayReach reach, Query&& query) const {
+std::optional<ShellHit> ClothScene::first_hit(const SceneRay& ray, RayReach reach,
+                                              Query&& query) const {
   std::optional<ShellHit> best;
   double limit = ray.t_max;
-  walk(ray, reach, limit, [&](std::uint32_t cloth, const ShellInterval& interval, std::uint32_t own_fiber) {
-    const LocalRay local = local_ray(interval, exemplar(cloth), ray.from != nullptr && interval.t0 == 0.0);
-    const std::optional<FiberHit> hit = query(cloth, local.ray, own_fiber);
-    if (!hit) return false;
-    const double s = std::clamp(static_cast<double>(hit->t) - local.margin, 0.0, 1.0);
-    const double t = interval.t0 + s * (interval.t1 - interval.t0);
-    if (t > limit || t < 0) return false;
-    limit = t;
-    best = ShellHit{cloth,
-                    interval.tet,
-                    hit->segment,
-                    t,
-                    ray.origin + t * ray.direction.cast<double>().normalized(),
-                    interval.fabric0 + s * (interval.fabric1 - interval.fabric0)};
-    return true;
-  });
+  walk(ray, reach, limit,
+       [&](std::uint32_t cloth, const ShellInterval& interval, std::uint32_t own_fiber) {
+         const LocalRay local =
+             local_ray(interval, exemplar(cloth), ray.from != nullptr && interval.t0 == 0.0);
+         const std::optional<FiberHit> hit = query(cloth, local.ray, own_fiber);
+         if (!hit) return false;
+         const double s = std::clamp(static_cast<double>(hit->t) - local.margin, 0.0, 1.0);
+         const double t = interval.t0 + s * (interval.t1 - interval.t0);
+         if (t > limit || t < 0) return false;
+         limit = t;
+         best = ShellHit{cloth,
+                         interval.tet,
+                         hit->segment,
+                         t,
+                         ray.origin + t * ray.direction.cast<double>().normalized(),
+                         interval.fabric0 + s * (interval.fabric1 - interval.fabric0)};
+         return true;
+       });
   return best;
 }
 

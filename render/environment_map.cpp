@@ -20,7 +20,8 @@ double luminance(const Rgb& radiance) {
          0.0722 * static_cast<double>(radiance[2]);
 }
 
-// Share of source cells [k, k + 1) in target cell `target` of `count`, as (first source cell, shares).
+// Share of source cells [k, k + 1) in target cell `target` of `count`, as (first source cell,
+// shares).
 struct Overlap {
   int first;
   std::vector<double> shares;
@@ -57,7 +58,8 @@ EnvironmentMap EnvironmentMap::read(const std::filesystem::path& path) {
   std::string extension = path.extension().string();
   for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   const Image image = extension == ".hdr" || extension == ".pic" ? read_hdr(path) : read_exr(path);
-  std::vector<Rgb> radiance(static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height));
+  std::vector<Rgb> radiance(static_cast<std::size_t>(image.width) *
+                            static_cast<std::size_t>(image.height));
   const char* names[] = {"R", "G", "B"};
   for (Eigen::Index c = 0; c < 3; ++c) {
     const auto channel = image.channels.find(names[c]);
@@ -67,9 +69,9 @@ EnvironmentMap EnvironmentMap::read(const std::filesystem::path& path) {
     for (std::size_t k = 0; k < radiance.size(); ++k) {
       const float value = channel->second.values[k];
       if (!(std::isfinite(value) && value >= 0)) {
-        throw FileError(fmt::format("{}: radiance {} in channel {} at column {}, row {}", path.string(), value,
-                                    names[c], k % static_cast<std::size_t>(image.width),
-                                    k / static_cast<std::size_t>(image.width)));
+        throw FileError(fmt::format(
+            "{}: radiance {} in channel {} at column {}, row {}", path.string(), value, names[c],
+            k % static_cast<std::size_t>(image.width), k / static_cast<std::size_t>(image.width)));
       }
       radiance[k][c] = value;
     }
@@ -80,7 +82,8 @@ EnvironmentMap EnvironmentMap::read(const std::filesystem::path& path) {
 Vec3d EnvironmentMap::centre(int row, int column) const {
   const double polar = kPi * (row + 0.5) / height_;
   const double azimuth = kPi * (1 - 2 * (column + 0.5) / width_);
-  return {std::sin(polar) * std::cos(azimuth), std::sin(polar) * std::sin(azimuth), std::cos(polar)};
+  return {std::sin(polar) * std::cos(azimuth), std::sin(polar) * std::sin(azimuth),
+          std::cos(polar)};
 }
 
 double EnvironmentMap::solid_angle(int row) const {
@@ -117,18 +120,22 @@ LightSample EnvironmentMap::sample(RandomStream& random) const {
     const Vec3 direction = sample_sphere(random);
     return {direction, Rgb::Zero(), pdf(direction)};
   }
-  // Each choice leaves a fresh uniform number within what was chosen, which places the point in the pixel.
+  // Each choice leaves a fresh uniform number within what was chosen, which places the point in the
+  // pixel.
   const auto choose = [](auto begin, auto end, double value) {
     const auto found = std::min(std::upper_bound(begin, end, value), end - 1);
     const double before = found == begin ? 0 : *(found - 1);
     const double rest = *found > before ? (value - before) / (*found - before) : 0.5;
     return std::pair(static_cast<int>(found - begin), std::clamp(rest, 0.0, 1.0));
   };
-  const auto [row, down] = choose(row_cumulative_.begin(), row_cumulative_.end(), random.uniform_double() * total);
+  const auto [row, down] =
+      choose(row_cumulative_.begin(), row_cumulative_.end(), random.uniform_double() * total);
   const auto columns = column_cumulative_.begin() + static_cast<std::ptrdiff_t>(index(row, 0));
-  const auto [column, across] = choose(columns, columns + width_, random.uniform_double() * *(columns + (width_ - 1)));
+  const auto [column, across] =
+      choose(columns, columns + width_, random.uniform_double() * *(columns + (width_ - 1)));
   // Uniform over the pixel's solid angle: in the cosine of the polar angle, and in azimuth.
-  const double cosine = std::lerp(std::cos(kPi * row / height_), std::cos(kPi * (row + 1) / height_), down);
+  const double cosine =
+      std::lerp(std::cos(kPi * row / height_), std::cos(kPi * (row + 1) / height_), down);
   const double sine = std::sqrt(std::max(0.0, 1 - cosine * cosine));
   const double azimuth = kPi * (1 - 2 * (column + across) / width_);
   const Rgb& value = pixel(row, column);
@@ -168,7 +175,8 @@ EnvironmentMap EnvironmentMap::reduced(int width, int height) const {
         Rgbd of_row = Rgbd::Zero();
         for (std::size_t c = 0; c < across.shares.size(); ++c) {
           of_row += across.shares[c] *
-                    pixel(rows.first + static_cast<int>(r), across.first + static_cast<int>(c)).cast<double>();
+                    pixel(rows.first + static_cast<int>(r), across.first + static_cast<int>(c))
+                        .cast<double>();
         }
         sum += weights[r] * of_row;
       }

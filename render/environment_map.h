@@ -2,12 +2,13 @@
 #define HEDDLE_RENDER_ENVIRONMENT_MAP_H_
 // Light from infinity as a latitude-longitude picture: radiance, constant on each pixel.
 //
-// Row 0 is at +z (up), the last one at -z, each of equal height in polar angle. The middle of the picture looks along +x, and
-// the view from inside is not mirrored: a quarter of the width to the right looks along -y, to the left along +y, and the
-// seam along -x. Azimuth atan2(y, x) = pi (1 - 2 u) with u from 0 (left) to 1. Blender has the same convention.
+// Row 0 is at +z (up), the last one at -z, each of equal height in polar angle. The middle of the
+// picture looks along +x, and the view from inside is not mirrored: a quarter of the width to the
+// right looks along -y, to the left along +y, and the seam along -x. Azimuth atan2(y, x) = pi (1 -
+// 2 u) with u from 0 (left) to 1. Blender has the same convention.
 //
-// Because pixels are constant, the integral, the density of sampling and averages over areas are all exact. Thread-safe.
-// Tested in tests/render/environment_map_test.cpp.
+// Because pixels are constant, the integral, the density of sampling and averages over areas are
+// all exact. Thread-safe. Tested in tests/render/environment_map_test.cpp.
 
 #include <filesystem>
 #include <vector>
@@ -24,8 +25,8 @@ class EnvironmentMap {
   /// radiance [row][column], finite and not negative.
   EnvironmentMap(int width, int height, std::vector<Rgb> radiance);
 
-  /// Reads OpenEXR, or a Radiance picture where the name ends in .hdr or .pic; channels R, G, B. Errors: FileError, also for
-  /// values that are negative or not finite.
+  /// Reads OpenEXR, or a Radiance picture where the name ends in .hdr or .pic; channels R, G, B.
+  /// Errors: FileError, also for values that are negative or not finite.
   static EnvironmentMap read(const std::filesystem::path& path);
 
   int width() const { return width_; }
@@ -41,12 +42,14 @@ class EnvironmentMap {
   /// The integral of radiance over the sphere.
   Rgbd integral() const;
 
-  /// Draws a direction with density proportional to luminance; uniformly where all is black. The weight is radiance / pdf.
+  /// Draws a direction with density proportional to luminance; uniformly where all is black. The
+  /// weight is radiance / pdf.
   LightSample sample(RandomStream& random) const;
   /// That density, 1/sr.
   float pdf(const Vec3& direction) const;
 
-  /// The same light on fewer pixels: averages over areas, so the integral stays. Sizes at most the map's own.
+  /// The same light on fewer pixels: averages over areas, so the integral stays. Sizes at most the
+  /// map's own.
   EnvironmentMap reduced(int width, int height) const;
 
  private:
@@ -55,13 +58,17 @@ class EnvironmentMap {
     int column;
   };
   Cell cell_of(const Vec3& direction) const;
-  std::size_t index(int row, int column) const { return static_cast<std::size_t>(row) * width_ + column; }
+  std::size_t index(int row, int column) const {
+    return static_cast<std::size_t>(row) * width_ + column;
+  }
 
   int width_;
   int height_;
-  std::vector<Rgb> radiance_;              // [row][column]
-  std::vector<double> row_cumulative_;     // [row] luminance times solid angle of all rows up to this one
-  std::vector<double> column_cumulative_;  // [row][column] luminance of the row's pixels up to this one
+  std::vector<Rgb> radiance_;  // [row][column]
+  // [row] luminance times solid angle of all rows up to this one
+  std::vector<double> row_cumulative_;
+  // [row][column] luminance of the row's pixels up to this one
+  std::vector<double> column_cumulative_;
 };
 
 }  // namespace heddle

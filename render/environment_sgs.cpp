@@ -74,8 +74,9 @@ class Level {
   }
 
   VectorXd column(const SphericalGaussian& gaussian) const {
-    return roots_.array() *
-           (gaussian.sharpness * ((gaussian.axis.transpose() * directions_).transpose().array() - 1)).exp();
+    return roots_.array() * (gaussian.sharpness *
+                             ((gaussian.axis.transpose() * directions_).transpose().array() - 1))
+                                .exp();
   }
   MatrixXd columns(const Lobes& lobes) const {
     MatrixXd result(directions_.cols(), lobes.count());
@@ -90,7 +91,8 @@ class Level {
     gram.diagonal() *= 1 + 1e-9;  // two lobes may coincide
     lobes.amplitudes.resize(lobes.count(), 3);
     for (int c = 0; c < 3; ++c) {
-      lobes.amplitudes.col(c) = nonnegative_least_squares(gram, columns_of.transpose() * target_.col(c));
+      lobes.amplitudes.col(c) =
+          nonnegative_least_squares(gram, columns_of.transpose() * target_.col(c));
     }
     return (target_ - columns_of * lobes.amplitudes).squaredNorm();
   }
@@ -100,7 +102,9 @@ class Level {
     return target_ - columns(lobes) * lobes.amplitudes;
   }
 
-  double relative(double squared_error) const { return norm_ > 0 ? std::sqrt(squared_error) / norm_ : 0; }
+  double relative(double squared_error) const {
+    return norm_ > 0 ? std::sqrt(squared_error) / norm_ : 0;
+  }
 
   // Levenberg-Marquardt steps of everything; the squared error never grows. Returns it.
   double refine(Lobes& lobes, int steps) const {
@@ -144,9 +148,12 @@ class Level {
       const Vec3d across = g.axis.unitOrthogonal();
       const Vec3d other = g.axis.cross(across);
       const auto value = basis.col(k).array();
-      basis.col(n + k) = g.sharpness * (across.transpose() * directions_).transpose().array() * value;
-      basis.col(2 * n + k) = g.sharpness * (other.transpose() * directions_).transpose().array() * value;
-      basis.col(3 * n + k) = g.sharpness * ((g.axis.transpose() * directions_).transpose().array() - 1) * value;
+      basis.col(n + k) =
+          g.sharpness * (across.transpose() * directions_).transpose().array() * value;
+      basis.col(2 * n + k) =
+          g.sharpness * (other.transpose() * directions_).transpose().array() * value;
+      basis.col(3 * n + k) =
+          g.sharpness * ((g.axis.transpose() * directions_).transpose().array() - 1) * value;
     }
     MatrixXd gram = MatrixXd::Zero(4 * n, 4 * n);
     gram.selfadjointView<Eigen::Lower>().rankUpdate(basis.transpose());
@@ -163,9 +170,11 @@ class Level {
     }
     for (Eigen::Index i = 0; i < 3; ++i) {
       for (Eigen::Index c = 0; c < 3; ++c) {
-        normal.block(c * n, (3 + i) * n, n, n) = gram.block(0, (1 + i) * n, n, n) * a.col(c).asDiagonal();
+        normal.block(c * n, (3 + i) * n, n, n) =
+            gram.block(0, (1 + i) * n, n, n) * a.col(c).asDiagonal();
         normal.block((3 + i) * n, c * n, n, n) = normal.block(c * n, (3 + i) * n, n, n).transpose();
-        right_side.segment((3 + i) * n, n).array() += a.col(c).array() * cross.col(c).segment((1 + i) * n, n).array();
+        right_side.segment((3 + i) * n, n).array() +=
+            a.col(c).array() * cross.col(c).segment((1 + i) * n, n).array();
       }
       for (Eigen::Index j = 0; j < 3; ++j) {
         normal.block((3 + i) * n, (3 + j) * n, n, n) =
@@ -181,12 +190,14 @@ class Level {
       const auto at = static_cast<std::size_t>(k);
       const Vec3d& axis = lobes.axes[at];
       const Vec3d across = axis.unitOrthogonal();
-      const double reach = 1 / std::sqrt(1 + std::exp(lobes.log_sharpness[at]));  // no more than the lobe's own width
+      // no more than the lobe's own width
+      const double reach = 1 / std::sqrt(1 + std::exp(lobes.log_sharpness[at]));
       const double a = std::clamp(step[3 * n + k], -reach, reach);
       const double b = std::clamp(step[4 * n + k], -reach, reach);
       result.axes[at] = (axis + a * across + b * axis.cross(across)).normalized();
-      result.log_sharpness[at] = std::clamp(lobes.log_sharpness[at] + std::clamp(step[5 * n + k], -1.0, 1.0),
-                                            kLowestLogSharpness, kHighestLogSharpness);
+      result.log_sharpness[at] =
+          std::clamp(lobes.log_sharpness[at] + std::clamp(step[5 * n + k], -1.0, 1.0),
+                     kLowestLogSharpness, kHighestLogSharpness);
     }
     return result;
   }
@@ -204,14 +215,17 @@ class Dictionary {
     constexpr int kAxes = 400;  // 10 degrees apart; refinement moves them
     for (double log_sharpness = kLowestLogSharpness; log_sharpness < kHighestLogSharpness;
          log_sharpness += std::log(2.0)) {
-      if (log_sharpness > kLowestLogSharpness && log_sharpness < -0.5) continue;  // all nearly constant
-      for (const Vec3d& axis : fibonacci_axes(FibonacciSet::kSphere, log_sharpness < -0.5 ? 1 : kAxes)) {
+      // all nearly constant
+      if (log_sharpness > kLowestLogSharpness && log_sharpness < -0.5) continue;
+      for (const Vec3d& axis :
+           fibonacci_axes(FibonacciSet::kSphere, log_sharpness < -0.5 ? 1 : kAxes)) {
         gaussians_.push_back({axis, std::exp(log_sharpness)});
       }
     }
     columns_.resize(level.residual({}).rows(), static_cast<Eigen::Index>(gaussians_.size()));
     for (std::size_t k = 0; k < gaussians_.size(); ++k) {
-      columns_.col(static_cast<Eigen::Index>(k)) = level.column(gaussians_[k]).normalized().cast<float>();
+      columns_.col(static_cast<Eigen::Index>(k)) =
+          level.column(gaussians_[k]).normalized().cast<float>();
     }
   }
 
@@ -241,13 +255,15 @@ EnvironmentMap blurred(const EnvironmentMap& map) {
     }
   }
   const EnvironmentMap source =
-      EnvironmentMap(map.width() * across, map.height() * down, std::move(repeated)).reduced(2 * kWidth, 2 * kHeight);
+      EnvironmentMap(map.width() * across, map.height() * down, std::move(repeated))
+          .reduced(2 * kWidth, 2 * kHeight);
   const double reach = 5 / std::sqrt(kEnvironmentBlur);  // exp(-12.5)
   std::vector<Rgb> result;
   for (int row = 0; row < kHeight; ++row) {
     const double polar = kPi * (row + 0.5) / kHeight;
     const int first = std::max(0, static_cast<int>((polar - reach) / kPi * source.height()));
-    const int last = std::min(source.height() - 1, static_cast<int>((polar + reach) / kPi * source.height()));
+    const int last =
+        std::min(source.height() - 1, static_cast<int>((polar + reach) / kPi * source.height()));
     std::vector<Rgbd> sums(kWidth, Rgbd::Zero());
     double whole = 0;  // the same for all columns
     for (int r = first; r <= last; ++r) {
@@ -255,7 +271,8 @@ EnvironmentMap blurred(const EnvironmentMap& map) {
       const double other = kPi * (r + 0.5) / source.height();
       for (int k = 0; k < source.width() / 2; ++k) {
         const double azimuth = 2 * kPi * (k + 0.5) / source.width();
-        const double cosine = std::cos(polar) * std::cos(other) + std::sin(polar) * std::sin(other) * std::cos(azimuth);
+        const double cosine = std::cos(polar) * std::cos(other) +
+                              std::sin(polar) * std::sin(other) * std::cos(azimuth);
         if (cosine < 1 - 0.5 * reach * reach) break;
         const double weight = source.solid_angle(r) * std::exp(kEnvironmentBlur * (cosine - 1));
         whole += 2 * weight;
@@ -300,11 +317,13 @@ EnvironmentSgs fit_environment_sgs(const EnvironmentMap& map, int count) {
     light.type = LightType::kSphericalGaussian;
     light.axis = g.axis.cast<float>();
     light.sharpness = static_cast<float>(without_blur(g.sharpness));
-    light.irradiance = (lobes.amplitudes.row(k).transpose().array() * sg_mass(g.sharpness)).cast<float>();
+    light.irradiance =
+        (lobes.amplitudes.row(k).transpose().array() * sg_mass(g.sharpness)).cast<float>();
     result.lights.push_back(light);
   }
-  std::stable_sort(result.lights.begin(), result.lights.end(),
-                   [](const Light& a, const Light& b) { return a.irradiance.sum() > b.irradiance.sum(); });
+  std::stable_sort(result.lights.begin(), result.lights.end(), [](const Light& a, const Light& b) {
+    return a.irradiance.sum() > b.irradiance.sum();
+  });
   return result;
 }
 

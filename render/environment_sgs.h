@@ -1,15 +1,18 @@
 #ifndef HEDDLE_RENDER_ENVIRONMENT_SGS_H_
 #define HEDDLE_RENDER_ENVIRONMENT_SGS_H_
-// An environment as a sum of spherical Gaussian lights, nearest to its blurred radiance in the least-squares sense:
-// the lighting of Iwasaki et al. 2014 (section 3), and a list of lights that every renderer takes.
+// An environment as a sum of spherical Gaussian lights, nearest to its blurred radiance in the
+// least-squares sense: the lighting of Iwasaki et al. 2014 (section 3), and a list of lights that
+// every renderer takes.
 //
-// The published text does not say how its Gaussians are found. Here the map is first blurred by a Gaussian of sharpness
-// kEnvironmentBlur (5 degrees): without, one sun of a few pixels takes all Gaussians, and the light that cloth receives is
-// off by half. Then one Gaussian at a time, each the one of a fixed set of axes and sharpnesses that takes most off the
-// error; after each, all axes, sharpnesses and colours are moved together by Levenberg-Marquardt steps, with colours kept
-// at or above 0 by non-negative least squares. First on 64 x 32 pixels, at the end on 128 x 64. At last the blur is taken
-// out of the sharpnesses, up to kSharpestLight. No random numbers: equal maps give equal lights. 0.3 s for 10
-// Gaussians, 4 s for 64. Tested in tests/render/environment_sgs_test.cpp; errors for real maps: docs/surface-models.md.
+// The published text does not say how its Gaussians are found. Here the map is first blurred by a
+// Gaussian of sharpness kEnvironmentBlur (5 degrees): without, one sun of a few pixels takes all
+// Gaussians, and the light that cloth receives is off by half. Then one Gaussian at a time, each
+// the one of a fixed set of axes and sharpnesses that takes most off the error; after each, all
+// axes, sharpnesses and colours are moved together by Levenberg-Marquardt steps, with colours kept
+// at or above 0 by non-negative least squares. First on 64 x 32 pixels, at the end on 128 x 64. At
+// last the blur is taken out of the sharpnesses, up to kSharpestLight. No random numbers: equal
+// maps give equal lights. 0.3 s for 10 Gaussians, 4 s for 64. Tested in
+// tests/render/environment_sgs_test.cpp; errors for real maps: docs/surface-models.md.
 
 #include <vector>
 
@@ -23,7 +26,8 @@ inline constexpr double kSharpestLight = 2000;
 
 struct EnvironmentSgs {
   std::vector<Light> lights;  // [count] spherical Gaussians, brightest first
-  double relative_error;      // root of the integral of |L - sum|^2 over that of |L|^2, both blurred
+  // root of the integral of |L - sum|^2 over that of |L|^2, both blurred
+  double relative_error;
 };
 
 /// count >= 1. A black map gives black lights and error 0.

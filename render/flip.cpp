@@ -8,8 +8,8 @@
 namespace heddle {
 namespace {
 
-// Exponents and breakpoint of the paper: q_c, p_c, p_t (section 4.1.4), q_f and the width of an edge detector in degrees
-// (section 4.2).
+// Exponents and breakpoint of the paper: q_c, p_c, p_t (section 4.1.4), q_f and the width of an
+// edge detector in degrees (section 4.2).
 constexpr double kColorExponent = 0.7;
 constexpr double kColorBreak = 0.4;
 constexpr double kColorBreakValue = 0.95;
@@ -27,7 +27,8 @@ using Plane = std::vector<Rgbd>;  // [pixel]
 
 /// Linear opponent space: luminance, red-green, blue-yellow; linear in light, unlike L*a*b*.
 Rgbd opponent(const Rgb& linear) {
-  const Rgbd xyz = (kXyzFromLinear * linear.max(0.0F).min(1.0F).cast<double>().matrix()).array() / kWhite;
+  const Rgbd xyz =
+      (kXyzFromLinear * linear.max(0.0F).min(1.0F).cast<double>().matrix()).array() / kWhite;
   return {116 * xyz[1] - 16, 500 * (xyz[0] - xyz[1]), 200 * (xyz[1] - xyz[2])};
 }
 
@@ -40,7 +41,8 @@ Rgbd hunt_lab(const Rgbd& linear) {
   };
   const double luminance = 116 * root(xyz[1]) - 16;
   const double scale = 0.01 * luminance;
-  return {luminance, scale * 500 * (root(xyz[0]) - root(xyz[1])), scale * 200 * (root(xyz[1]) - root(xyz[2]))};
+  return {luminance, scale * 500 * (root(xyz[0]) - root(xyz[1])),
+          scale * 200 * (root(xyz[1]) - root(xyz[2]))};
 }
 
 Rgbd hunt_lab_of_opponent(const Rgbd& value) {
@@ -76,7 +78,8 @@ Kernel contrast_kernel(double pixels_per_degree) {
   constexpr std::array<Gaussians, 3> kSensitivity = {
       {{1, 0.0047, 0, 1e-5}, {1, 0.0053, 0, 1e-5}, {34.1, 0.04, 13.5, 0.025}}};
   const double widest = kSensitivity[2].b1;
-  const int radius = static_cast<int>(std::ceil(3 * std::sqrt(widest / (2 * kPi * kPi)) * pixels_per_degree));
+  const int radius =
+      static_cast<int>(std::ceil(3 * std::sqrt(widest / (2 * kPi * kPi)) * pixels_per_degree));
   Kernel kernel = make_kernel(radius, [&](int x, int y) {
     const double square = (x * x + y * y) / (pixels_per_degree * pixels_per_degree);
     Rgbd tap;
@@ -93,7 +96,8 @@ Kernel contrast_kernel(double pixels_per_degree) {
   return kernel;
 }
 
-/// Channel 0: first derivative of a Gaussian along x (edges), 1: the second (points); positive taps sum to 1, negative to -1.
+/// Channel 0: first derivative of a Gaussian along x (edges), 1: the second (points); positive taps
+/// sum to 1, negative to -1.
 Kernel feature_kernel(double pixels_per_degree) {
   const double sigma = 0.5 * kFeatureWidth * pixels_per_degree;
   Kernel kernel = make_kernel(static_cast<int>(std::ceil(3 * sigma)), [&](int x, int y) {
@@ -114,7 +118,8 @@ Kernel feature_kernel(double pixels_per_degree) {
 
 /// visit(dx, dy, tap, value) over the neighbourhood of a pixel.
 template <class Visit>
-void convolve(const Kernel& kernel, const Plane& plane, int width, int height, int x, int y, Visit&& visit) {
+void convolve(const Kernel& kernel, const Plane& plane, int width, int height, int x, int y,
+              Visit&& visit) {
   std::size_t k = 0;
   for (int dy = -kernel.radius; dy <= kernel.radius; ++dy) {
     const int row = std::clamp(y + dy, 0, height - 1);
@@ -130,15 +135,20 @@ struct Features {
   double point;
 };
 
-Features features_at(const Kernel& kernel, const Plane& opponent_plane, int width, int height, int x, int y) {
+Features features_at(const Kernel& kernel, const Plane& opponent_plane, int width, int height,
+                     int x, int y) {
   const int side = 2 * kernel.radius + 1;
   Rgbd along_x = Rgbd::Zero();
   Rgbd along_y = Rgbd::Zero();
-  convolve(kernel, opponent_plane, width, height, x, y, [&](int dx, int dy, const Rgbd& tap, const Rgbd& value) {
-    const double luminance = (value[0] + 16) / 116;
-    along_x += luminance * tap;
-    along_y += luminance * kernel.taps[static_cast<std::size_t>((dx + kernel.radius) * side + dy + kernel.radius)];
-  });
+  convolve(
+      kernel, opponent_plane, width, height, x, y,
+      [&](int dx, int dy, const Rgbd& tap, const Rgbd& value) {
+        const double luminance = (value[0] + 16) / 116;
+        along_x += luminance * tap;
+        along_y +=
+            luminance *
+            kernel.taps[static_cast<std::size_t>((dx + kernel.radius) * side + dy + kernel.radius)];
+      });
   return {std::hypot(along_x[0], along_y[0]), std::hypot(along_x[1], along_y[1])};
 }
 
@@ -146,7 +156,8 @@ Features features_at(const Kernel& kernel, const Plane& opponent_plane, int widt
 double remapped(double difference, double largest) {
   const double at_break = kColorBreak * largest;
   if (difference < at_break) return kColorBreakValue / at_break * difference;
-  return std::min(1.0, kColorBreakValue + (difference - at_break) / (largest - at_break) * (1 - kColorBreakValue));
+  return std::min(1.0, kColorBreakValue +
+                           (difference - at_break) / (largest - at_break) * (1 - kColorBreakValue));
 }
 
 }  // namespace
@@ -169,7 +180,8 @@ std::vector<float> flip_map(std::span<const Rgb> a, std::span<const Rgb> b, int 
 
   const Kernel contrast = contrast_kernel(pixels_per_degree);
   const Kernel feature = feature_kernel(pixels_per_degree);
-  const double largest = std::pow(hyab(hunt_lab(Rgbd(0, 1, 0)), hunt_lab(Rgbd(0, 0, 1))), kColorExponent);
+  const double largest =
+      std::pow(hyab(hunt_lab(Rgbd(0, 1, 0)), hunt_lab(Rgbd(0, 0, 1))), kColorExponent);
   std::vector<float> map(count);
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
@@ -179,19 +191,23 @@ std::vector<float> flip_map(std::span<const Rgb> a, std::span<const Rgb> b, int 
                  [&](int, int, const Rgbd& tap, const Rgbd& value) { sum += tap * value; });
         return hunt_lab_of_opponent(sum);
       };
-      const double color = remapped(std::pow(hyab(filtered(left), filtered(right)), kColorExponent), largest);
+      const double color =
+          remapped(std::pow(hyab(filtered(left), filtered(right)), kColorExponent), largest);
       const Features of_left = features_at(feature, left, width, height, x, y);
       const Features of_right = features_at(feature, right, width, height, x, y);
-      const double difference =
-          std::max(std::abs(of_left.edge - of_right.edge), std::abs(of_left.point - of_right.point));
-      const double features = std::min(1.0, std::pow(difference / std::sqrt(2.0), kFeatureExponent));
-      map[static_cast<std::size_t>(y) * width + x] = static_cast<float>(std::pow(color, 1 - features));
+      const double difference = std::max(std::abs(of_left.edge - of_right.edge),
+                                         std::abs(of_left.point - of_right.point));
+      const double features =
+          std::min(1.0, std::pow(difference / std::sqrt(2.0), kFeatureExponent));
+      map[static_cast<std::size_t>(y) * width + x] =
+          static_cast<float>(std::pow(color, 1 - features));
     }
   }
   return map;
 }
 
-double flip_error(std::span<const Rgb> a, std::span<const Rgb> b, int width, int height, double pixels_per_degree) {
+double flip_error(std::span<const Rgb> a, std::span<const Rgb> b, int width, int height,
+                  double pixels_per_degree) {
   const std::vector<float> map = flip_map(a, b, width, height, pixels_per_degree);
   double sum = 0;
   for (const float value : map) sum += static_cast<double>(value);

@@ -75,17 +75,19 @@ struct BlockSums {
 /// The value that 99 % do not exceed; reorders.
 double percentile99_of(std::vector<double>& values) {
   if (values.empty()) return 0;
-  const auto place = static_cast<std::ptrdiff_t>(std::ceil(0.99 * static_cast<double>(values.size()))) - 1;
+  const auto place =
+      static_cast<std::ptrdiff_t>(std::ceil(0.99 * static_cast<double>(values.size()))) - 1;
   std::nth_element(values.begin(), values.begin() + place, values.end());
   return values[static_cast<std::size_t>(place)];
 }
 
 }  // namespace
 
-PictureErrorEstimate estimate_error(std::span<const Rgb> picture, const HalvedReference& reference, int width, int height,
-                                    int edge) {
+PictureErrorEstimate estimate_error(std::span<const Rgb> picture, const HalvedReference& reference,
+                                    int width, int height, int edge) {
   const std::size_t count = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
-  assert(picture.size() == count && reference.half0.size() == count && reference.half1.size() == count && edge > 0);
+  assert(picture.size() == count && reference.half0.size() == count &&
+         reference.half1.size() == count && edge > 0);
   const int across = (width + edge - 1) / edge;
   const int down = (height + edge - 1) / edge;
   std::vector<BlockSums> blocks(static_cast<std::size_t>(across) * static_cast<std::size_t>(down));
@@ -99,7 +101,8 @@ PictureErrorEstimate estimate_error(std::span<const Rgb> picture, const HalvedRe
       const Rgbd half1 = reference.half1[k].cast<double>();
       blocks[static_cast<std::size_t>(y / edge) * across + x / edge].add(
           {((value - half0) * (value - half1)).mean(), value, 0.5 * (half0 + half1), 1}, 1);
-      for (int c = 0; c < 3; ++c) magnitudes.push_back(std::abs(value[c] - 0.5 * (half0[c] + half1[c])));
+      for (int c = 0; c < 3; ++c)
+        magnitudes.push_back(std::abs(value[c] - 0.5 * (half0[c] + half1[c])));
     }
   }
   BlockSums all;
@@ -179,8 +182,8 @@ double relative_noise(std::span<const Rgb> variance, std::span<const Rgb> refere
   return count == 0 ? 0.0 : std::sqrt(sum / static_cast<double>(count));
 }
 
-std::vector<std::uint8_t> difference_picture(std::span<const Rgb> picture, std::span<const Rgb> reference,
-                                             double scale) {
+std::vector<std::uint8_t> difference_picture(std::span<const Rgb> picture,
+                                             std::span<const Rgb> reference, double scale) {
   assert(picture.size() == reference.size() && scale > 0);
   std::vector<std::uint8_t> bytes;
   bytes.reserve(3 * picture.size());

@@ -1,9 +1,9 @@
 #ifndef HEDDLE_RENDER_IMAGE_METRICS_H_
 #define HEDDLE_RENDER_IMAGE_METRICS_H_
-// How far a picture is from a reference. Relative RMSE over n values = sqrt(mean d^2) / mean reference, with
-// d^2 = (F - R0)(F - R1) for two independent halves of the reference, so that its noise does not count
-// (design of the errors: per-value relative errors explode on dark values). Values are colour channels of
-// pixels. Tested in tests/render/image_metrics_test.cpp.
+// How far a picture is from a reference. Relative RMSE over n values = sqrt(mean d^2) / mean
+// reference, with d^2 = (F - R0)(F - R1) for two independent halves of the reference, so that its
+// noise does not count (design of the errors: per-value relative errors explode on dark values).
+// Values are colour channels of pixels. Tested in tests/render/image_metrics_test.cpp.
 
 #include <cstdint>
 #include <span>
@@ -13,8 +13,8 @@
 
 namespace heddle {
 
-/// A reference picture in two independent halves; the same picture twice where there is only one, and then
-/// its noise counts as error.
+/// A reference picture in two independent halves; the same picture twice where there is only one,
+/// and then its noise counts as error.
 struct HalvedReference {
   std::span<const Rgb> half0;  // [pixel]
   std::span<const Rgb> half1;  // [pixel]
@@ -34,42 +34,46 @@ struct PictureError {
 PictureError compare_pictures(std::span<const Rgb> picture, const HalvedReference& reference,
                               std::span<const std::uint8_t> mask);
 
-/// What a chart says of a picture: the errors of compare_pictures with the interval in which they lie, and how bad the worst
-/// values are. Intervals are 95 % (1.96 standard errors) from a delete-one jackknife over blocks of pixels, which hold what
-/// neighbours have in common (a kernel's width of noise, a fold that all get wrong); the mean square is what is jackknifed, as
+/// What a chart says of a picture: the errors of compare_pictures with the interval in which they
+/// lie, and how bad the worst values are. Intervals are 95 % (1.96 standard errors) from a
+/// delete-one jackknife over blocks of pixels, which hold what neighbours have in common (a
+/// kernel's width of noise, a fold that all get wrong); the mean square is what is jackknifed, as
 /// its root is far from normal where the error is near the noise.
 struct PictureErrorEstimate {
   double relative_rmse = 0;
   double rmse_low = 0;  // 0 where the error cannot be told from none
   double rmse_high = 0;
-  Rgbd color_ratio = Rgbd::Ones();         // mean picture / mean reference; 1 for a channel without light
-  Rgbd color_ratio_error = Rgbd::Zero();   // one standard error
-  double percentile99 = 0;                 // of |picture - mean of both halves| / mean reference; noise counts
+  // mean picture / mean reference; 1 for a channel without light
+  Rgbd color_ratio = Rgbd::Ones();
+  Rgbd color_ratio_error = Rgbd::Zero();  // one standard error
+  // of |picture - mean of both halves| / mean reference; noise counts
+  double percentile99 = 0;
   int blocks = 0;
 };
 
 /// Blocks are square, `edge` pixels wide (smaller at the rim), and at least two.
-PictureErrorEstimate estimate_error(std::span<const Rgb> picture, const HalvedReference& reference, int width, int height,
-                                    int edge);
+PictureErrorEstimate estimate_error(std::span<const Rgb> picture, const HalvedReference& reference,
+                                    int width, int height, int edge);
 
-/// The noise of a reference in two halves, relative to its mean: of the mean of both halves, root mean square, and the 99th
-/// percentile of its magnitude. What is left of an error of this size in a percentile says nothing.
+/// The noise of a reference in two halves, relative to its mean: of the mean of both halves, root
+/// mean square, and the 99th percentile of its magnitude. What is left of an error of this size in
+/// a percentile says nothing.
 struct ReferenceNoise {
   double rms = 0;
   double percentile99 = 0;
 };
 ReferenceNoise reference_noise(const HalvedReference& reference);
 
-/// Per-pixel relative RMSE of a picture whose only error is noise: root of the mean over pixels of (channel
-/// mean of the variance of the pixel's mean) / (channel mean of the reference)^2, where the reference has
-/// light.
+/// Per-pixel relative RMSE of a picture whose only error is noise: root of the mean over pixels of
+/// (channel mean of the variance of the pixel's mean) / (channel mean of the reference)^2, where
+/// the reference has light.
 double relative_noise(std::span<const Rgb> variance, std::span<const Rgb> reference,
                       std::span<const std::uint8_t> mask);
 
-/// Mean over the colour channels of (picture - reference) / `scale`: 0 is white, too bright red, too dark
-/// blue, full colour at +-1. [pixel][3] bytes.
-std::vector<std::uint8_t> difference_picture(std::span<const Rgb> picture, std::span<const Rgb> reference,
-                                             double scale);
+/// Mean over the colour channels of (picture - reference) / `scale`: 0 is white, too bright red,
+/// too dark blue, full colour at +-1. [pixel][3] bytes.
+std::vector<std::uint8_t> difference_picture(std::span<const Rgb> picture,
+                                             std::span<const Rgb> reference, double scale);
 
 }  // namespace heddle
 

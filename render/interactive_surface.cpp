@@ -6,15 +6,16 @@
 
 namespace heddle {
 
-DistanceMaps bake_distance_maps(const ClothScene& scene, const SurfaceCloth& surface, ClothSide side,
-                                const std::function<void()>& vertex_done) {
+DistanceMaps bake_distance_maps(const ClothScene& scene, const SurfaceCloth& surface,
+                                ClothSide side, const std::function<void()>& vertex_done) {
   std::vector<Mat3> frames;
   for (std::uint32_t v = 0; v < surface.vertex_count(); ++v) {
     frames.push_back(surface.vertex_frame(v, side).cast<float>());
   }
   return {frames,
           [&](std::uint32_t v, const Vec3& direction) {
-            return scene.globally_visible({surface.vertex_position(v), frames[v].col(2).cast<double>()}, direction);
+            return scene.globally_visible(
+                {surface.vertex_position(v), frames[v].col(2).cast<double>()}, direction);
           },
           {},
           vertex_done};
@@ -25,7 +26,8 @@ InteractiveSurface::InteractiveSurface(std::shared_ptr<const InteractiveMicrocyl
                                        std::shared_ptr<const DistanceMaps> back)
     : model_(std::move(model)), face_(std::move(face)), back_(std::move(back)) {}
 
-Rgb InteractiveSurface::light(const SurfaceHit& hit, const Vec3& wo, std::span<const Light> lights) const {
+Rgb InteractiveSurface::light(const SurfaceHit& hit, const Vec3& wo,
+                              std::span<const Light> lights) const {
   const DistanceMaps& maps = hit.side == ClothSide::kFace ? *face_ : *back_;
   std::vector<float> coefficients(maps.stride(), 0.0F);
   for (std::size_t k = 0; k < 3; ++k) {
@@ -34,7 +36,8 @@ Rgb InteractiveSurface::light(const SurfaceHit& hit, const Vec3& wo, std::span<c
     const auto weight = static_cast<float>(hit.vertex_weights[k]);
     for (std::size_t j = 0; j < at.size(); ++j) coefficients[j] += weight * at[j];
   }
-  return model_->shade(hit.world_from_patch, wo.cast<double>(), lights, {&maps, coefficients}).cast<float>();
+  return model_->shade(hit.world_from_patch, wo.cast<double>(), lights, {&maps, coefficients})
+      .cast<float>();
 }
 
 }  // namespace heddle

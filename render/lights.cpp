@@ -11,10 +11,12 @@ namespace {
 
 /// An environment's picture is turned by the angle of its axis about z.
 Vec3 world_from_picture(const Light& light, const Vec3& d) {
-  return {light.axis.x() * d.x() - light.axis.y() * d.y(), light.axis.y() * d.x() + light.axis.x() * d.y(), d.z()};
+  return {light.axis.x() * d.x() - light.axis.y() * d.y(),
+          light.axis.y() * d.x() + light.axis.x() * d.y(), d.z()};
 }
 Vec3 picture_from_world(const Light& light, const Vec3& d) {
-  return {light.axis.x() * d.x() + light.axis.y() * d.y(), light.axis.x() * d.y() - light.axis.y() * d.x(), d.z()};
+  return {light.axis.x() * d.x() + light.axis.y() * d.y(),
+          light.axis.x() * d.y() - light.axis.y() * d.x(), d.z()};
 }
 
 }  // namespace

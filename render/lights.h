@@ -1,9 +1,10 @@
 #ifndef HEDDLE_RENDER_LIGHTS_H_
 #define HEDDLE_RENDER_LIGHTS_H_
-// Lights at infinity: directional ones, and spherical Gaussians L(w) = irradiance G(w; axis, sharpness) /
-// M(sharpness). `irradiance` is the integral of L over all directions, measured perpendicular to the axis;
-// sharpness 0 is constant light from everywhere with L = irradiance / 4 pi. An environment is a picture of the light from
-// all around (environment_map.h), turned about the z axis. Tested in tests/render/lights_test.cpp.
+// Lights at infinity: directional ones, and spherical Gaussians L(w) = irradiance G(w; axis,
+// sharpness) / M(sharpness). `irradiance` is the integral of L over all directions, measured
+// perpendicular to the axis; sharpness 0 is constant light from everywhere with L = irradiance / 4
+// pi. An environment is a picture of the light from all around (environment_map.h), turned about
+// the z axis. Tested in tests/render/lights_test.cpp.
 
 #include <cstdint>
 #include <memory>
@@ -21,20 +22,23 @@ enum class LightType : std::uint8_t { kDirectional, kSphericalGaussian, kEnviron
 
 struct Light {
   LightType type = LightType::kDirectional;
-  Vec3 axis = Vec3(0, 0, 1);  // unit, towards the light; of an environment, horizontal: where its picture's middle lies
-  float sharpness = 0;        // spherical Gaussians only, >= 0
+  // unit, towards the light; of an environment, horizontal: where its picture's middle lies
+  Vec3 axis = Vec3(0, 0, 1);
+  float sharpness = 0;            // spherical Gaussians only, >= 0
   Rgb irradiance = Rgb(1, 1, 1);  // of an environment: factor of the picture's radiance
   std::shared_ptr<const EnvironmentMap> map = {};  // environments only
-  int gaussians = 0;                          // environments only: spherical Gaussians that stand for it in precomputed methods
+  // environments only: spherical Gaussians that stand for it in precomputed methods
+  int gaussians = 0;
 
   bool is_directional() const { return type == LightType::kDirectional; }
 };
 
-/// How light is found: by shadow rays alone, by directions drawn from what scatters alone (which never meet a
-/// directional light), or both, weighted by the power heuristic.
+/// How light is found: by shadow rays alone, by directions drawn from what scatters alone (which
+/// never meet a directional light), or both, weighted by the power heuristic.
 enum class LightEstimator : std::uint8_t { kShadowRays, kEscapes, kCombined };
 
-/// Radiance from `direction`; 0 for directional lights, which no direction drawn otherwise can meet.
+/// Radiance from `direction`; 0 for directional lights, which no direction drawn otherwise can
+/// meet.
 Rgb light_radiance(const Light& light, const Vec3& direction);
 
 struct LightSample {
@@ -47,8 +51,9 @@ LightSample sample_light(const Light& light, RandomStream& random);
 /// Density (1/sr) with which sample_light draws `direction`; 0 for directional lights.
 float light_pdf(const Light& light, const Vec3& direction);
 
-/// Lights for methods that know directional and Gaussian ones only: every environment as the Gaussians fitted to it.
-/// relative_error: of the worst fit, 0 without environments (environment_sgs.h).
+/// Lights for methods that know directional and Gaussian ones only: every environment as the
+/// Gaussians fitted to it. relative_error: of the worst fit, 0 without environments
+/// (environment_sgs.h).
 struct FittedLights {
   std::vector<Light> lights;
   double relative_error = 0;

@@ -12,8 +12,8 @@
 namespace heddle {
 
 Mat3 wo_space(const Vec3& tangent, const Vec3& wo) {
-  // Below this length of wo's part across the tangent, its direction is rounding error; so is the choice of y
-  // then, since the BCSDF at theta_o = 90 degrees does not depend on it.
+  // Below this length of wo's part across the tangent, its direction is rounding error; so is the
+  // choice of y then, since the BCSDF at theta_o = 90 degrees does not depend on it.
   constexpr float kAlong = 1e-5F;
   const Vec3 across = wo - wo.dot(tangent) * tangent;
   const float length = across.norm();
@@ -27,7 +27,8 @@ Mat3 wo_space(const Vec3& tangent, const Vec3& wo) {
 
 namespace {
 
-// Strata of a Gaussian's mass in its polar and azimuthal angle, from which its part over the horizon is projected.
+// Strata of a Gaussian's mass in its polar and azimuthal angle, from which its part over the
+// horizon is projected.
 constexpr int kPolar = 64;
 constexpr int kAzimuths = 64;
 
@@ -53,7 +54,8 @@ struct Circle {
       cosine[at] = std::cos(azimuth);
       sine[at] = std::sin(azimuth);
       const auto values = azimuth_harmonics(cosine[at], sine[at]);
-      for (int m = 0; m < ConeTransfer::kAzimuths; ++m) harmonics(n, m) = values[static_cast<std::size_t>(m)];
+      for (int m = 0; m < ConeTransfer::kAzimuths; ++m)
+        harmonics(n, m) = values[static_cast<std::size_t>(m)];
     }
   }
 };
@@ -79,7 +81,8 @@ MultipleScattering::LightShape::LightShape(std::optional<float> sharpness, FaceL
   cone_share_ *= std::clamp((*sharpness - kConesFrom) / (kConesAlone - kConesFrom), 0.0F, 1.0F);
   variance_ = 1 / std::max(*sharpness, kConesFrom);
   const std::vector<double> ratios = spherical_bessel_ratios(kMaxShOrder, *sharpness);
-  std::transform(ratios.begin(), ratios.end(), band_.begin(), [](double a) { return static_cast<float>(a); });
+  std::transform(ratios.begin(), ratios.end(), band_.begin(),
+                 [](double a) { return static_cast<float>(a); });
 
   constexpr int kCount = sh_count(kMaxShOrder);
   upper_.assign(static_cast<std::size_t>(kInclinations) * kCount, 0.0F);
@@ -94,10 +97,12 @@ MultipleScattering::LightShape::LightShape(std::optional<float> sharpness, FaceL
       const double sine = std::sqrt(std::max(0.0, 1 - cosine * cosine));
       for (int a = 0; a < kAzimuths; ++a) {
         const double azimuth = 2 * kPi * (a + 0.5) / kAzimuths;
-        const Vec3d w = cosine * axis + sine * (std::cos(azimuth) * side + std::sin(azimuth) * Vec3d(0, 1, 0));
+        const Vec3d w =
+            cosine * axis + sine * (std::cos(azimuth) * side + std::sin(azimuth) * Vec3d(0, 1, 0));
         if (w.z() <= 0) continue;
         evaluate_sh(kMaxShOrder, w, y.data());
-        for (int j = 0; j < kCount; ++j) sum[static_cast<std::size_t>(j)] += y[static_cast<std::size_t>(j)];
+        for (int j = 0; j < kCount; ++j)
+          sum[static_cast<std::size_t>(j)] += y[static_cast<std::size_t>(j)];
       }
     }
     for (int l = 0; l <= kMaxShOrder; ++l) {
@@ -110,11 +115,13 @@ MultipleScattering::LightShape::LightShape(std::optional<float> sharpness, FaceL
   }
 }
 
-void MultipleScattering::LightShape::project(int order, bool both_sides, const Vec3& axis, float* coefficients) const {
+void MultipleScattering::LightShape::project(int order, bool both_sides, const Vec3& axis,
+                                             float* coefficients) const {
   if (both_sides || face_light_ == FaceLight::kPrinted) {
     evaluate_sh(order, axis, coefficients);
     for (int l = 0; l <= order; ++l) {
-      for (int m = -l; m <= l; ++m) coefficients[l * (l + 1) + m] *= band_[static_cast<std::size_t>(l)];
+      for (int m = -l; m <= l; ++m)
+        coefficients[l * (l + 1) + m] *= band_[static_cast<std::size_t>(l)];
     }
     return;
   }
@@ -129,7 +136,8 @@ void MultipleScattering::LightShape::project(int order, bool both_sides, const V
   HemisphereDual::of_order(order).apply(coefficients);
 }
 
-void MultipleScattering::LightShape::moments_above(int order, const Vec3& axis, float* moments) const {
+void MultipleScattering::LightShape::moments_above(int order, const Vec3& axis,
+                                                   float* moments) const {
   const float place = std::acos(std::clamp(axis.z(), -1.0F, 1.0F)) * (kInclinations - 1) / kPif;
   const int row = std::min(static_cast<int>(place), kInclinations - 2);
   const float share = place - static_cast<float>(row);
@@ -164,8 +172,9 @@ void MultipleScattering::incoming(std::uint32_t cell, const LightShape& light, c
   }
 }
 
-Rgb MultipleScattering::outgoing_from_cones(const CellLight& incoming, const LightShape& light, const Vec3& axis,
-                                            std::uint32_t segment, std::uint16_t material, const Vec3& tangent,
+Rgb MultipleScattering::outgoing_from_cones(const CellLight& incoming, const LightShape& light,
+                                            const Vec3& axis, std::uint32_t segment,
+                                            std::uint16_t material, const Vec3& tangent,
                                             const Vec3& wo) const {
   if (!transfer_->cones || !(light.cone_share() > 0)) return Rgb::Zero();
   // Directions on the light's cone about the bundle, in wo-space.
@@ -188,33 +197,36 @@ Rgb MultipleScattering::outgoing_from_cones(const CellLight& incoming, const Lig
   using Moments = Eigen::Matrix<float, ConeTransfer::kAzimuths, 3, Eigen::RowMajor>;
   Rgb sum = Rgb::Zero();
   for (int width = 0; width < ConeTransfer::kWidths; ++width) {
-    const Eigen::Map<const Moments> moments(incoming.cones.data() + width * ConeTransfer::kAzimuths * 3);
+    const Eigen::Map<const Moments> moments(incoming.cones.data() +
+                                            width * ConeTransfer::kAzimuths * 3);
     const Eigen::Matrix<float, kAzimuthNodes, 3> arriving = points.harmonics * moments;
     const float variance = ConeTransfer::variance_of(width) + light.variance();
     for (int half = 0; half < 2; ++half) {
       const RgbLanes lanes = arriving.middleRows<kLanes>(half * kLanes).array();
       const auto at = static_cast<std::size_t>(half);
-      sum += materials_[material].blurred_scatter(theta_i[at], cos_turn[at], theta_o, variance, lanes);
+      sum +=
+          materials_[material].blurred_scatter(theta_i[at], cos_turn[at], theta_o, variance, lanes);
     }
   }
   return light.cone_share() * (2 * kPif / kAzimuthNodes) * sum;
 }
 
 Rgb MultipleScattering::radiance(const LightShape& light, const Vec3& axis, std::uint32_t segment,
-                                 std::uint16_t material, const Vec3& tangent, const Vec3& wo) const {
+                                 std::uint16_t material, const Vec3& tangent,
+                                 const Vec3& wo) const {
   CellLight arriving;
   incoming(transfer_->cell_of_segment[segment], light, axis, arriving);
   return outgoing(arriving.harmonics, material, tangent, wo) +
          outgoing_from_cones(arriving, light, axis, segment, material, tangent, wo);
 }
 
-Rgb MultipleScattering::outgoing(const IncomingField& field, std::uint16_t material, const Vec3& tangent,
-                                 const Vec3& wo) const {
+Rgb MultipleScattering::outgoing(const IncomingField& field, std::uint16_t material,
+                                 const Vec3& tangent, const Vec3& wo) const {
   return outgoing_from_field(transfer_->order, field, materials_[material], tangent, wo);
 }
 
-Rgb outgoing_from_field(int order, const IncomingField& field, const BcsdfTable& bcsdf, const Vec3& tangent,
-                        const Vec3& wo) {
+Rgb outgoing_from_field(int order, const IncomingField& field, const BcsdfTable& bcsdf,
+                        const Vec3& tangent, const Vec3& wo) {
   IncomingField turned;
   ShRotation(order, wo_space(tangent, wo).cast<double>()).rotate<3>(field.data(), turned.data());
   IncomingField response;

@@ -1,24 +1,28 @@
 #ifndef HEDDLE_RENDER_MULTIPLE_SCATTERING_H_
 #define HEDDLE_RENDER_MULTIPLE_SCATTERING_H_
-// Light that scatters more than once, from the precomputed transfer of a cell (Khungurn 2017, section 5.3.1), in real
-// spherical harmonics. Everything is in fabric space. Radiance for a light of irradiance 1, before macroscopic shadows.
+// Light that scatters more than once, from the precomputed transfer of a cell (Khungurn 2017,
+// section 5.3.1), in real spherical harmonics. Everything is in fabric space. Radiance for a light
+// of irradiance 1, before macroscopic shadows.
 //
 //   c_light[j]   directional: Y_j(w); spherical Gaussian: A_l(sharpness) Y_lm(axis)
 //   c_T          = a^T c_light: the indirect light that arrives at the cell (Transfer::incoming)
-//   outgoing     = c_S(theta_o) . D(R) c_T: rotated into the wo-space (x = tangent, wo in the xy plane, y > 0) of the
+//   outgoing     = c_S(theta_o) . D(R) c_T: rotated into the wo-space (x = tangent, wo in the xy
+//                plane, y > 0) of the
 //                  BCSDF's coefficients
 //
-// A truncated expansion rings: an incoming field, and with it the outgoing radiance, can be slightly negative. Signs are
-// kept, so that sums over samples have the expansion's mean; who shows a picture may clamp it.
-// Under light from the face only, the transfer is known, and asked for, above the horizon only: its stored coefficients are
-// moments over the upper hemisphere, and light is projected onto their dual (fibers/math/hemisphere_dual.h):
-// c_light = G^+ integral over z > 0 of L Y_j. Taking the coefficients for those of a function that is 0 below the horizon, as
-// printed, loses light near it (flat gabardine, light at 70 degrees: 13 % too dark); an odd continuation below it is better,
-// the dual better still (docs/performance.md).
-// Where the transfer keeps light on cones apart (fibers/baked/cone_transfer.h), it is taken out of the harmonics and scattered on
-// its own, per light: the Gaussian about the light's cone, widened by the light's own, times the fiber's lobes, in closed form in inclination and by
-// kAzimuthNodes points in azimuth about the bundle. Lights so soft that the harmonics hold them do without (cone_share).
-// Tested in tests/render/multiple_scattering_test.cpp.
+// A truncated expansion rings: an incoming field, and with it the outgoing radiance, can be
+// slightly negative. Signs are kept, so that sums over samples have the expansion's mean; who shows
+// a picture may clamp it. Under light from the face only, the transfer is known, and asked for,
+// above the horizon only: its stored coefficients are moments over the upper hemisphere, and light
+// is projected onto their dual (fibers/math/hemisphere_dual.h): c_light = G^+ integral over z > 0
+// of L Y_j. Taking the coefficients for those of a function that is 0 below the horizon, as
+// printed, loses light near it (flat gabardine, light at 70 degrees: 13 % too dark); an odd
+// continuation below it is better, the dual better still (docs/performance.md). Where the transfer
+// keeps light on cones apart (fibers/baked/cone_transfer.h), it is taken out of the harmonics and
+// scattered on its own, per light: the Gaussian about the light's cone, widened by the light's own,
+// times the fiber's lobes, in closed form in inclination and by kAzimuthNodes points in azimuth
+// about the bundle. Lights so soft that the harmonics hold them do without (cone_share). Tested in
+// tests/render/multiple_scattering_test.cpp.
 
 #include <array>
 #include <optional>
@@ -39,19 +43,21 @@ using IncomingField =
 /// What one light sends to a cell: harmonics, without what is on cones, and that.
 struct CellLight {
   IncomingField harmonics;
-  std::array<float, ConeTransfer::kWidths * ConeTransfer::kAzimuths * 3> cones;  // [width][azimuth][rgb]
+  // [width][azimuth][rgb]
+  std::array<float, ConeTransfer::kWidths * ConeTransfer::kAzimuths * 3> cones;
 };
 
 class MultipleScattering {
  public:
-  /// What is passed must outlive this object. bundle_tangent [segment] is needed where the transfer has cones.
+  /// What is passed must outlive this object. bundle_tangent [segment] is needed where the transfer
+  /// has cones.
   MultipleScattering(const Transfer& transfer, std::span<const BcsdfTable> materials,
                      std::span<const Vec3> bundle_tangent = {})
       : transfer_(&transfer), materials_(materials), bundle_tangent_(bundle_tangent) {}
 
-  /// A light's shape, computed once for all samples: band factors A_l for light from both sides, and for light from the
-  /// face a table of the moments over the upper hemisphere by the inclination of the axis. Without a sharpness:
-  /// directional.
+  /// A light's shape, computed once for all samples: band factors A_l for light from both sides,
+  /// and for light from the face a table of the moments over the upper hemisphere by the
+  /// inclination of the axis. Without a sharpness: directional.
   class LightShape {
    public:
     /// How light is projected where the fabric takes it from its face only.
@@ -61,8 +67,9 @@ class MultipleScattering {
     };
     explicit LightShape(std::optional<float> sharpness, FaceLight face_light = FaceLight::kDual);
 
-    /// Share of the light on cones that is scattered as such; the rest is left in the harmonics. From 0 at sharpness 8 to 1 at 20: on flat
-    /// silk, harmonics alone err less at 8 (9.0 against 10.8 % of multiple scattering), cones at 30 (14 against 27 %).
+    /// Share of the light on cones that is scattered as such; the rest is left in the harmonics.
+    /// From 0 at sharpness 8 to 1 at 20: on flat silk, harmonics alone err less at 8 (9.0
+    /// against 10.8 % of multiple scattering), cones at 30 (14 against 27 %).
     float cone_share() const { return cone_share_; }
     /// Variance that the light's own width adds to a cone's.
     float variance() const { return variance_; }
@@ -71,8 +78,8 @@ class MultipleScattering {
     void project(int order, bool both_sides, const Vec3& axis, float* coefficients) const;
 
    private:
-    // Rows of upper_, for axis inclinations from +z in equal steps; between them, linear interpolation (error below 2e-3 of
-    // the largest coefficient, as its test measures).
+    // Rows of upper_, for axis inclinations from +z in equal steps; between them, linear
+    // interpolation (error below 2e-3 of the largest coefficient, as its test measures).
     static constexpr int kInclinations = 129;
     /// Integrals over z > 0 of the normalised Gaussian about `axis` times Y_j: [sh_count(order)].
     void moments_above(int order, const Vec3& axis, float* moments) const;
@@ -82,21 +89,26 @@ class MultipleScattering {
     float cone_share_ = 1;
     float variance_ = 0;
     std::array<float, kMaxShOrder + 1> band_;  // [l]
-    std::vector<float> upper_;  // [inclination][j] of a light whose axis lies in the xz plane; m < 0 are 0
+    // [inclination][j] of a light whose axis lies in the xz plane; m < 0 are 0
+    std::vector<float> upper_;
   };
 
   /// What a light about `axis` (unit, fabric space) sends to `cell`.
-  void incoming(std::uint32_t cell, const LightShape& light, const Vec3& axis, CellLight& result) const;
+  void incoming(std::uint32_t cell, const LightShape& light, const Vec3& axis,
+                CellLight& result) const;
 
   /// Radiance towards wo from a fiber with this tangent in the field (unit vectors, fabric space).
-  Rgb outgoing(const IncomingField& field, std::uint16_t material, const Vec3& tangent, const Vec3& wo) const;
-  /// Radiance towards wo from a segment, by the part of `incoming` that one light sends on cones; 0 where there is none.
-  Rgb outgoing_from_cones(const CellLight& incoming, const LightShape& light, const Vec3& axis, std::uint32_t segment,
-                          std::uint16_t material, const Vec3& tangent, const Vec3& wo) const;
+  Rgb outgoing(const IncomingField& field, std::uint16_t material, const Vec3& tangent,
+               const Vec3& wo) const;
+  /// Radiance towards wo from a segment, by the part of `incoming` that one light sends on cones; 0
+  /// where there is none.
+  Rgb outgoing_from_cones(const CellLight& incoming, const LightShape& light, const Vec3& axis,
+                          std::uint32_t segment, std::uint16_t material, const Vec3& tangent,
+                          const Vec3& wo) const;
 
   /// Both, for one light.
-  Rgb radiance(const LightShape& light, const Vec3& axis, std::uint32_t segment, std::uint16_t material,
-               const Vec3& tangent, const Vec3& wo) const;
+  Rgb radiance(const LightShape& light, const Vec3& axis, std::uint32_t segment,
+               std::uint16_t material, const Vec3& tangent, const Vec3& wo) const;
 
  private:
   const Transfer* transfer_;
@@ -105,11 +117,11 @@ class MultipleScattering {
 };
 
 /// Radiance towards wo from a fiber with this tangent in the field of harmonics up to `order`.
-Rgb outgoing_from_field(int order, const IncomingField& field, const BcsdfTable& bcsdf, const Vec3& tangent,
-                        const Vec3& wo);
+Rgb outgoing_from_field(int order, const IncomingField& field, const BcsdfTable& bcsdf,
+                        const Vec3& tangent, const Vec3& wo);
 
-/// Axes of wo-space as rows: x = tangent, wo = (sin theta_o, cos theta_o, 0). Any y where wo is along the
-/// tangent.
+/// Axes of wo-space as rows: x = tangent, wo = (sin theta_o, cos theta_o, 0). Any y where wo is
+/// along the tangent.
 Mat3 wo_space(const Vec3& tangent, const Vec3& wo);
 
 }  // namespace heddle

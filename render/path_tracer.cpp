@@ -45,8 +45,8 @@ PathTracer::Sample PathTracer::radiance(const ClothTrace::Vertex& vertex, const 
     }
     return true;
   };
-  const std::optional<PathEscape> escape =
-      walk_path(trace_, materials_, vertex, wo, Rgb(1, 1, 1), random, settings_.limits, by_shadow_rays);
+  const std::optional<PathEscape> escape = walk_path(trace_, materials_, vertex, wo, Rgb(1, 1, 1),
+                                                     random, settings_.limits, by_shadow_rays);
   if (escape && settings_.estimator != LightEstimator::kShadowRays) {
     Rgb light_sum = Rgb::Zero();
     for (const Light& light : lights_) {
@@ -65,14 +65,16 @@ PathTracer::Sample PathTracer::trace(const EyeRay& ray, RandomStream& random) co
   const SceneRay scene_ray{ray.origin, ray.direction};
   const std::optional<ShellHit> hit = scene_->first_fiber(scene_ray);
   Sample sample;
-  if (const auto mesh = scene_->first_mesh(ray.origin, ray.direction, hit ? hit->t : scene_ray.t_max)) {
+  if (const auto mesh =
+          scene_->first_mesh(ray.origin, ray.direction, hit ? hit->t : scene_ray.t_max)) {
     sample.alpha = 1;
     if (mesh->surface == nullptr) return sample;
     const SurfaceHit surface =
         mesh->surface->hit(mesh->triangle, mesh->u, mesh->v, ray.direction, ray.spread * mesh->t);
     sample.single = surface_direct_light(
-        surface, -ray.direction, lights_, settings_.estimator, random,
-        [&](const Vec3& direction) { return scene_->visible({surface.position, surface.normal}, direction); });
+        surface, -ray.direction, lights_, settings_.estimator, random, [&](const Vec3& direction) {
+          return scene_->visible({surface.position, surface.normal}, direction);
+        });
   } else if (hit) {
     sample = radiance(trace_.vertex(*hit), -ray.direction, random);
     sample.alpha = 1;
@@ -89,29 +91,33 @@ std::vector<BcsdfTable> scene_materials(const ClothScene& scene) {
 }
 
 FrameBuffers trace_picture(const PathTracer& tracer, const Camera& camera, const PixelRect& crop,
-                           std::uint64_t seed, const SampleBudget& budget, const RenderProgress& progress) {
+                           std::uint64_t seed, const SampleBudget& budget,
+                           const RenderProgress& progress) {
   assert(budget.seconds || (budget.spp >= 2 && budget.spp % 2 == 0));
   const int pixel_count = crop.width * crop.height;
   std::vector<PixelSums> sums(static_cast<std::size_t>(pixel_count));
 
   const auto pass = [&](int first_sample, int last_sample) {
     // 16 pixels: long enough to pay for a task, short enough to share out a few expensive ones.
-    tbb::parallel_for(tbb::blocked_range<int>(0, pixel_count, 16), [&](const tbb::blocked_range<int>& range) {
-      for (int k = range.begin(); k < range.end(); ++k) {
-        const int x = crop.x0 + k % crop.width;
-        const int y = crop.y0 + k / crop.width;
-        const auto pixel = static_cast<std::uint64_t>(y) * static_cast<std::uint64_t>(camera.width()) +
-                           static_cast<std::uint64_t>(x);
-        PixelSums& sum = sums[static_cast<std::size_t>(k)];
-        for (int s = first_sample; s < last_sample; ++s) {
-          RandomStream eye(seed, RandomStage::kEyeRay, pixel, static_cast<std::uint64_t>(s));
-          RandomStream random(seed, RandomStage::kPathTracer, pixel, static_cast<std::uint64_t>(s));
-          const double px = x + eye.uniform_double();
-          const double py = y + eye.uniform_double();
-          sum.add(tracer.trace(camera.ray(px, py), random), s);
-        }
-      }
-    });
+    tbb::parallel_for(
+        tbb::blocked_range<int>(0, pixel_count, 16), [&](const tbb::blocked_range<int>& range) {
+          for (int k = range.begin(); k < range.end(); ++k) {
+            const int x = crop.x0 + k % crop.width;
+            const int y = crop.y0 + k / crop.width;
+            const auto pixel =
+                static_cast<std::uint64_t>(y) * static_cast<std::uint64_t>(camera.width()) +
+                static_cast<std::uint64_t>(x);
+            PixelSums& sum = sums[static_cast<std::size_t>(k)];
+            for (int s = first_sample; s < last_sample; ++s) {
+              RandomStream eye(seed, RandomStage::kEyeRay, pixel, static_cast<std::uint64_t>(s));
+              RandomStream random(seed, RandomStage::kPathTracer, pixel,
+                                  static_cast<std::uint64_t>(s));
+              const double px = x + eye.uniform_double();
+              const double py = y + eye.uniform_double();
+              sum.add(tracer.trace(camera.ray(px, py), random), s);
+            }
+          }
+        });
   };
 
   FrameBuffers frame(crop.width, crop.height);
@@ -126,7 +132,8 @@ FrameBuffers trace_picture(const PathTracer& tracer, const Camera& camera, const
       pass(frame.spp, frame.spp + count);
       frame.spp += count;
       const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
-      share = budget.seconds ? spent.count() / *budget.seconds : static_cast<double>(frame.spp) / wanted;
+      share = budget.seconds ? spent.count() / *budget.seconds
+                             : static_cast<double>(frame.spp) / wanted;
     }
     progress(1.0);
     for (std::size_t k = 0; k < sums.size(); ++k) sums[k].store(frame.spp, k, frame);

@@ -1,12 +1,14 @@
 #ifndef HEDDLE_RENDER_PATH_TRACER_H_
 #define HEDDLE_RENDER_PATH_TRACER_H_
-// The reference: eye paths among the shell-mapped explicit fibers, by the same walk and the same BCSDF as the
-// transfer stage, with the light found by shadow rays at every vertex and by paths that escape, combined by
-// the power heuristic (Veach 1997). `single` is light scattered once, `multiple` the rest.
+// The reference: eye paths among the shell-mapped explicit fibers, by the same walk and the same
+// BCSDF as the transfer stage, with the light found by shadow rays at every vertex and by paths
+// that escape, combined by the power heuristic (Veach 1997). `single` is light scattered once,
+// `multiple` the rest.
 //
-// Local pictures (paths end where they leave the shell) keep the shadows of all cloth and meshes: what the
-// precomputed methods claim to match. Surface cloths are lit directly, past the fibers (surface_cloth.h). Random numbers are addressed by (seed, pixel of the full frame, sample)
-// and sums run in sample order, so a picture depends neither on threads nor on the crop. Tested in
+// Local pictures (paths end where they leave the shell) keep the shadows of all cloth and meshes:
+// what the precomputed methods claim to match. Surface cloths are lit directly, past the fibers
+// (surface_cloth.h). Random numbers are addressed by (seed, pixel of the full frame, sample) and
+// sums run in sample order, so a picture depends neither on threads nor on the crop. Tested in
 // tests/render/path_tracer_test.cpp.
 
 #include <cstdint>
@@ -36,9 +38,11 @@ struct PathTracerSettings {
 
 class PathTracer {
  public:
-  /// materials: [ClothScene::materials()], see scene_materials(). All references must outlive the tracer.
-  PathTracer(const ClothScene& scene, std::span<const BcsdfTable> materials, std::span<const Light> lights,
-             const Rgb& background, const PathTracerSettings& settings);
+  /// materials: [ClothScene::materials()], see scene_materials(). All references must outlive the
+  /// tracer.
+  PathTracer(const ClothScene& scene, std::span<const BcsdfTable> materials,
+             std::span<const Light> lights, const Rgb& background,
+             const PathTracerSettings& settings);
 
   using Sample = EyeSample;
   /// Radiance that comes back along one eye ray.
@@ -58,21 +62,23 @@ class PathTracer {
 /// BCSDF tables of all materials of a scene.
 std::vector<BcsdfTable> scene_materials(const ClothScene& scene);
 
-/// Either a number of samples per pixel (even, at least 2) or a time; a timed picture is made of whole passes
-/// of two samples per pixel, at least one. `more` may lengthen it.
+/// Either a number of samples per pixel (even, at least 2) or a time; a timed picture is made of
+/// whole passes of two samples per pixel, at least one. `more` may lengthen it.
 struct SampleBudget {
   int spp = 2;
   std::optional<double> seconds;
   MoreSamples more = {};
 };
 
-/// Called between passes with the share done of the samples asked for so far, 0 .. 1; may throw to stop.
+/// Called between passes with the share done of the samples asked for so far, 0 .. 1; may throw to
+/// stop.
 using RenderProgress = std::function<void(double)>;
 
-/// Beauty, single, multiple, alpha, half0 (even samples), half1 (odd samples), variance of the pixel's mean;
-/// spp done.
+/// Beauty, single, multiple, alpha, half0 (even samples), half1 (odd samples), variance of the
+/// pixel's mean; spp done.
 FrameBuffers trace_picture(const PathTracer& tracer, const Camera& camera, const PixelRect& crop,
-                           std::uint64_t seed, const SampleBudget& budget, const RenderProgress& progress);
+                           std::uint64_t seed, const SampleBudget& budget,
+                           const RenderProgress& progress);
 
 }  // namespace heddle
 

@@ -1,8 +1,8 @@
 #ifndef HEDDLE_RENDER_PIXEL_SUMS_H_
 #define HEDDLE_RENDER_PIXEL_SUMS_H_
-// One eye ray's result, and the sums of a pixel's eye rays that become its place in the frame buffers: the same for the
-// path tracer and the precomputed methods. Sums run in the order of the calls.
-// Tested in tests/render/path_tracer_test.cpp and precomputed_renderer_test.cpp.
+// One eye ray's result, and the sums of a pixel's eye rays that become its place in the frame
+// buffers: the same for the path tracer and the precomputed methods. Sums run in the order of the
+// calls. Tested in tests/render/path_tracer_test.cpp and precomputed_renderer_test.cpp.
 
 #include "fibers/math/vector.h"
 #include "render/render_output.h"
@@ -29,7 +29,8 @@ class PixelSums {
     alpha_ += static_cast<double>(sample.alpha);
   }
 
-  /// Writes pixel k of the frame from samples 0 .. spp - 1; the halves and the variance where the frame holds them.
+  /// Writes pixel k of the frame from samples 0 .. spp - 1; the halves and the variance where the
+  /// frame holds them.
   void store(int spp, std::size_t k, FrameBuffers& frame) const {
     const double n = spp;
     const Rgbd mean = (half_[0] + half_[1]) / n;

@@ -16,12 +16,12 @@
 namespace heddle {
 namespace {
 
-/// Draws after which a light counts as wholly behind the cloth. Of a light with a tenth of its mass in front,
-/// 3 % of the draws find none of it.
+/// Draws after which a light counts as wholly behind the cloth. Of a light with a tenth of its mass
+/// in front, 3 % of the draws find none of it.
 constexpr int kFaceDraws = 32;
 
-/// A block is this many pixels wide and high, and takes this many samples at a time: 2048 samples fill a
-/// G-buffer of 400 KB, and give a close-up enough samples per cell to sort.
+/// A block is this many pixels wide and high, and takes this many samples at a time: 2048 samples
+/// fill a G-buffer of 400 KB, and give a close-up enough samples per cell to sort.
 constexpr int kBlockEdge = 16;
 constexpr int kBlockSamples = 8;
 
@@ -36,20 +36,23 @@ Vec2 sample_gaussian2(RandomStream& random) {
 
 void require(bool present, const FabricPack& pack, const char* what) {
   if (present) return;
-  throw FileError(
-      fmt::format("{}: the pack holds no {}, which this picture needs", pack.folder.string(), what));
+  throw FileError(fmt::format("{}: the pack holds no {}, which this picture needs",
+                              pack.folder.string(), what));
 }
 
-std::shared_ptr<const SingleScatteringModel> single_scattering_of(const FabricPack& pack, LocalShading shading,
-                                                                 const VisibilityBlend& blend) {
+std::shared_ptr<const SingleScatteringModel> single_scattering_of(const FabricPack& pack,
+                                                                  LocalShading shading,
+                                                                  const VisibilityBlend& blend) {
   switch (shading) {
     case LocalShading::kPrt:
-      return std::make_shared<const PrtScattering>(*pack.ssdf, pack.light_from_both_sides, pack.materials);
+      return std::make_shared<const PrtScattering>(*pack.ssdf, pack.light_from_both_sides,
+                                                   pack.materials);
     case LocalShading::kTsaiShih16:
     case LocalShading::kTsaiShihFull:
       return std::make_shared<const TsaiShihScattering>(
           *pack.ssdf, pack.light_from_both_sides, pack.materials,
-          shading == LocalShading::kTsaiShih16 ? BcsdfFactors::kRecommendedTerms : BcsdfFactors::kAllTerms);
+          shading == LocalShading::kTsaiShih16 ? BcsdfFactors::kRecommendedTerms
+                                               : BcsdfFactors::kAllTerms);
     default:
       return std::make_shared<const SingleScattering>(
           pack.ssdf ? &*pack.ssdf : nullptr, pack.sgs ? &*pack.sgs : nullptr, pack.materials, blend,
@@ -64,7 +67,8 @@ std::optional<float> shape_of(const Light& light) {
 
 }  // namespace
 
-PrecomputedRenderer::PrecomputedRenderer(const ClothScene& scene, std::span<const FabricPack* const> packs,
+PrecomputedRenderer::PrecomputedRenderer(const ClothScene& scene,
+                                         std::span<const FabricPack* const> packs,
                                          std::span<const Light> lights, const Rgb& background,
                                          const PrecomputedSettings& settings)
     : scene_(&scene),
@@ -80,7 +84,8 @@ PrecomputedRenderer::PrecomputedRenderer(const ClothScene& scene, std::span<cons
   bool any_soft = false;
   for (const Light& light : lights_) {
     shapes_.emplace_back(shape_of(light), printed ? FaceLight::kPrinted : FaceLight::kDual);
-    any_sharp = any_sharp || light.is_directional() || settings.blend.uses_distance(light.sharpness);
+    any_sharp =
+        any_sharp || light.is_directional() || settings.blend.uses_distance(light.sharpness);
     any_soft = any_soft || (!light.is_directional() && settings.blend.uses_lobes(light.sharpness));
   }
   if (settings.shading == LocalShading::kPrt || settings.shading == LocalShading::kTsaiShih16 ||
@@ -107,10 +112,11 @@ PrecomputedRenderer::PrecomputedRenderer(const ClothScene& scene, std::span<cons
       } else {
         first.single = single_scattering_of(pack, settings.shading, settings.blend);
         if (settings.transfer_order) {
-          first.cut_transfer = std::make_shared<const Transfer>(cut_to_order(*pack.transfer, *settings.transfer_order));
+          first.cut_transfer = std::make_shared<const Transfer>(
+              cut_to_order(*pack.transfer, *settings.transfer_order));
         }
-        first.multiple.emplace(first.cut_transfer ? *first.cut_transfer : *pack.transfer, pack.materials,
-                               pack.bundle_tangent);
+        first.multiple.emplace(first.cut_transfer ? *first.cut_transfer : *pack.transfer,
+                               pack.materials, pack.bundle_tangent);
       }
     }
     cloths_.push_back(known->second);
@@ -128,9 +134,8 @@ std::optional<ShellHit> PrecomputedRenderer::eye_hit(const SceneRay& ray) const 
                            });
 }
 
-PrecomputedRenderer::GlobalVisibility PrecomputedRenderer::global_visibility(const ShellHit& hit,
-                                                                             const Light& light,
-                                                                             RandomStream& random) const {
+PrecomputedRenderer::GlobalVisibility PrecomputedRenderer::global_visibility(
+    const ShellHit& hit, const Light& light, RandomStream& random) const {
   const Cloth& cloth = cloths_[hit.cloth];
   const bool both_sides = cloth.pack->light_from_both_sides;
   Vec3 direction = light.axis;
@@ -158,13 +163,16 @@ Rgb PrecomputedRenderer::surface_light(const SurfaceHit& hit, std::uint32_t surf
   if (surface < settings_.interactive.size() && settings_.interactive[surface]) {
     return settings_.interactive[surface]->light(hit, wo, lights_);
   }
-  return surface_direct_light(hit, wo, scene_lights_, LightEstimator::kCombined, random, [&](const Vec3& direction) {
-    return scene_->globally_visible({hit.position, hit.normal}, direction);
-  });
+  return surface_direct_light(
+      hit, wo, scene_lights_, LightEstimator::kCombined, random, [&](const Vec3& direction) {
+        return scene_->globally_visible({hit.position, hit.normal}, direction);
+      });
 }
 
-DualScattering::Parts PrecomputedRenderer::dual_scattered(const ShellHit& hit, const ShadingPoint& point,
-                                                          const Light& light, RandomStream& random) const {
+DualScattering::Parts PrecomputedRenderer::dual_scattered(const ShellHit& hit,
+                                                          const ShadingPoint& point,
+                                                          const Light& light,
+                                                          RandomStream& random) const {
   const Cloth& cloth = cloths_[hit.cloth];
   const Vec3 world = sample_light(light, random).direction;
   const Vec3 fabric = scene_->fabric_direction(hit, world);
@@ -178,7 +186,8 @@ DualScattering::Parts PrecomputedRenderer::dual_scattered(const ShellHit& hit, c
 }
 
 void PrecomputedRenderer::shade(const Camera& camera, const PixelRect& block, int first, int last,
-                                std::vector<Sample>& samples, std::vector<std::optional<Seen>>& seen) const {
+                                std::vector<Sample>& samples,
+                                std::vector<std::optional<Seen>>& seen) const {
   const int pixels = block.width * block.height;
   const int per_pixel = last - first;
   samples.assign(static_cast<std::size_t>(pixels * per_pixel), Sample{});
@@ -196,7 +205,8 @@ void PrecomputedRenderer::shade(const Camera& camera, const PixelRect& block, in
   for (int i = 0; i < pixels * per_pixel; ++i) {
     const int pixel = i / per_pixel;
     const int s = first + i % per_pixel;
-    RandomStream eye(settings_.seed, RandomStage::kEyeRay, address(pixel), static_cast<std::uint64_t>(s));
+    RandomStream eye(settings_.seed, RandomStage::kEyeRay, address(pixel),
+                     static_cast<std::uint64_t>(s));
     const double x = block.x0 + pixel % block.width + eye.uniform_double();
     const double y = block.y0 + pixel / block.width + eye.uniform_double();
     const EyeRay ray = camera.ray(x, y);
@@ -208,12 +218,14 @@ void PrecomputedRenderer::shade(const Camera& camera, const PixelRect& block, in
     if (!hit && mesh && mesh->surface != nullptr) {
       const SurfaceHit surface =
           mesh->surface->hit(mesh->triangle, mesh->u, mesh->v, ray.direction, ray.spread * mesh->t);
-      RandomStream random(settings_.seed, RandomStage::kLightVisibility, address(pixel), static_cast<std::uint64_t>(s));
+      RandomStream random(settings_.seed, RandomStage::kLightVisibility, address(pixel),
+                          static_cast<std::uint64_t>(s));
       samples[i].single = surface_light(surface, mesh->mesh, -ray.direction, random);
       const Vec2& place = surface.point.position_mm;
       if (s == 0) {
-        seen[pixel] = Seen{Seen::kNone, Seen::kNone, surface.position, Vec3d(place.x(), place.y(), 0),
-                           surface.world_from_patch.col(0).cast<float>()};
+        seen[pixel] =
+            Seen{Seen::kNone, Seen::kNone, surface.position, Vec3d(place.x(), place.y(), 0),
+                 surface.world_from_patch.col(0).cast<float>()};
       }
     }
     if (!hit) {
@@ -230,8 +242,8 @@ void PrecomputedRenderer::shade(const Camera& camera, const PixelRect& block, in
     hits.push_back(*hit);
     sample_of.push_back(i);
     if (s == 0) {
-      seen[pixel] =
-          Seen{hit->segment, points.back().cell, hit->position, hit->fabric, points.back().tangent.world};
+      seen[pixel] = Seen{hit->segment, points.back().cell, hit->position, hit->fabric,
+                         points.back().tangent.world};
     }
   }
 
@@ -256,7 +268,8 @@ void PrecomputedRenderer::shade(const Camera& camera, const PixelRect& block, in
     const Cloth& cloth = cloths_[hit.cloth];
     const int values = cloth.multiple ? 3 * cloth.pack->transfer->coefficients() : 0;
     Sample& sample = samples[sample_of[k]];
-    RandomStream random(settings_.seed, RandomStage::kLightVisibility, address(sample_of[k] / per_pixel),
+    RandomStream random(settings_.seed, RandomStage::kLightVisibility,
+                        address(sample_of[k] / per_pixel),
                         static_cast<std::uint64_t>(first + sample_of[k] % per_pixel));
     IncomingField field;
     std::fill_n(field.begin(), values, 0.0F);
@@ -273,9 +286,10 @@ void PrecomputedRenderer::shade(const Camera& camera, const PixelRect& block, in
       }
       const DirectionPair axis = {light.axis, scene_->fabric_direction(hit, light.axis)};
       if (visible.at_point) {
-        sample.single += light.irradiance * (light.is_directional() ? cloth.single->directional(point, axis)
-                                                                    : cloth.single->spherical_gaussian(
-                                                                          point, axis, light.sharpness));
+        sample.single += light.irradiance *
+                         (light.is_directional()
+                              ? cloth.single->directional(point, axis)
+                              : cloth.single->spherical_gaussian(point, axis, light.sharpness));
       }
       if (!visible.nearby) continue;
       any_nearby = true;
@@ -287,18 +301,21 @@ void PrecomputedRenderer::shade(const Camera& camera, const PixelRect& block, in
         cloth.multiple->incoming(point.cell, shapes_[l], axis.fabric, own.light);
       }
       for (int j = 0; j < values; ++j) field[j] += light.irradiance[j % 3] * own.light.harmonics[j];
-      sample.multiple += light.irradiance * cloth.multiple->outgoing_from_cones(own.light, shapes_[l], axis.fabric,
-                                                                                point.segment, point.material,
-                                                                                point.tangent.fabric, point.wo.fabric);
+      sample.multiple += light.irradiance *
+                         cloth.multiple->outgoing_from_cones(own.light, shapes_[l], axis.fabric,
+                                                             point.segment, point.material,
+                                                             point.tangent.fabric, point.wo.fabric);
     }
     if (any_nearby) {
-      sample.multiple += cloth.multiple->outgoing(field, point.material, point.tangent.fabric, point.wo.fabric);
+      sample.multiple +=
+          cloth.multiple->outgoing(field, point.material, point.tangent.fabric, point.wo.fabric);
     }
   }
 }
 
-FrameBuffers shade_picture(const PrecomputedRenderer& renderer, const Camera& camera, const PixelRect& crop, int spp,
-                           const RenderProgress& progress, const MoreSamples& more) {
+FrameBuffers shade_picture(const PrecomputedRenderer& renderer, const Camera& camera,
+                           const PixelRect& crop, int spp, const RenderProgress& progress,
+                           const MoreSamples& more) {
   FrameBuffers frame(crop.width, crop.height);
   const std::size_t count = frame.pixel_count();
   frame.segment.assign(count, PrecomputedRenderer::Seen::kNone);
@@ -316,7 +333,8 @@ FrameBuffers shade_picture(const PrecomputedRenderer& renderer, const Camera& ca
   const int rows = (crop.height + kBlockEdge - 1) / kBlockEdge;
   const int blocks = columns * rows;
   constexpr std::size_t kBlockPixels = kBlockEdge * kBlockEdge;
-  std::vector<PixelSums> all_sums(static_cast<std::size_t>(blocks) * kBlockPixels);  // [block][pixel]
+  // [block][pixel]
+  std::vector<PixelSums> all_sums(static_cast<std::size_t>(blocks) * kBlockPixels);
   const auto shade_block = [&](int index, int first_sample, int last_sample) {
     const int left = index % columns * kBlockEdge;  // within the crop
     const int top = index / columns * kBlockEdge;

@@ -28,7 +28,8 @@ void add_triples(Image& image, const Triples& values, ChannelType type,
   }
 }
 
-void add_color(Image& image, const std::string& layer, const std::vector<Rgb>& values, ChannelType type) {
+void add_color(Image& image, const std::string& layer, const std::vector<Rgb>& values,
+               ChannelType type) {
   add_triples(image, values, type,
               {channel_name(layer, "R"), channel_name(layer, "G"), channel_name(layer, "B")});
 }
@@ -37,7 +38,8 @@ void add_color(Image& image, const std::string& layer, const std::vector<Rgb>& v
 
 std::uint64_t picture_bytes(int width_px, int height_px, int spp, bool with_fiber_layers) {
   const std::uint64_t colors = spp >= 2 ? 6 : 3;
-  const std::uint64_t fibers = with_fiber_layers ? 2 * sizeof(std::uint32_t) + 2 * sizeof(Vec3) + sizeof(float) : 0;
+  const std::uint64_t fibers =
+      with_fiber_layers ? 2 * sizeof(std::uint32_t) + 2 * sizeof(Vec3) + sizeof(float) : 0;
   const std::uint64_t frame = colors * sizeof(Rgb) + sizeof(float) + fibers;
   const std::uint64_t image = frame;  // channel by channel
   const std::uint64_t pixel = frame + std::max<std::uint64_t>(sizeof(PixelSums), image);
@@ -65,7 +67,8 @@ Image image_of(const FrameBuffers& frame, const std::map<std::string, std::strin
 }
 
 std::vector<Rgb> layer_of(const Image& image, const std::string& layer, const std::string& name) {
-  std::vector<Rgb> colors(static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height));
+  std::vector<Rgb> colors(static_cast<std::size_t>(image.width) *
+                          static_cast<std::size_t>(image.height));
   for (int c = 0; c < 3; ++c) {
     const std::string channel = channel_name(layer, kColorChannels[static_cast<std::size_t>(c)]);
     const auto found = image.channels.find(channel);

@@ -56,7 +56,8 @@ CameraConfig read_camera(const TomlTable& table) {
   const Vec3d view = camera.look_at - camera.position;
   if (view.norm() < 1e-9) table.fail("look_at_mm", "expected a point different from position_mm");
   // Below a milliradian the picture's upright direction would be decided by rounding.
-  if (view.normalized().cross(camera.up).norm() < 1e-3 * camera.up.norm() || camera.up.norm() < 1e-9) {
+  if (view.normalized().cross(camera.up).norm() < 1e-3 * camera.up.norm() ||
+      camera.up.norm() < 1e-9) {
     table.fail("up", "expected a direction that is not parallel to the view direction");
   }
   return camera;
@@ -71,7 +72,8 @@ ReferenceConfig read_reference(const TomlTable& table, const CameraConfig& camer
     table.fail("size_px", "expected a rectangle inside the picture");
   }
   reference.spp = static_cast<int>(table.integer("spp", 2, 1 << 24, reference.spp));
-  if (reference.spp % 2 != 0) table.fail("spp", "expected an even number: the path tracer keeps two half pictures");
+  if (reference.spp % 2 != 0)
+    table.fail("spp", "expected an even number: the path tracer keeps two half pictures");
   reference.local = table.boolean("local", false);
   return reference;
 }
@@ -93,7 +95,8 @@ ViewConfig read_view(const TomlTable& table, const SceneConfig& scene, int defau
 std::string read_view_name(const TomlTable& table, const SceneConfig& scene) {
   const std::string name = table.string("name");
   const auto is_plain = [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_';
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' ||
+           c == '_';
   };
   if (name.empty() || !std::all_of(name.begin(), name.end(), is_plain)) {
     table.fail("name", "expected letters, digits, - and _: it becomes a file name");
@@ -143,13 +146,16 @@ SurfaceFabric read_surface(const TomlTable& table, const char* key) {
   const std::string name = table.string(key);
   const auto document = [&] {
     if (name.ends_with(".toml")) {
-      const std::filesystem::path file = std::filesystem::path(table.document_name()).parent_path() / name;
-      if (!std::filesystem::is_regular_file(file)) table.fail(key, "no such file: " + file.string());
+      const std::filesystem::path file =
+          std::filesystem::path(table.document_name()).parent_path() / name;
+      if (!std::filesystem::is_regular_file(file))
+        table.fail(key, "no such file: " + file.string());
       return TomlTable::load(file);
     }
     const std::vector<std::string> known = surface_preset_names();
     if (std::find(known.begin(), known.end(), name) == known.end()) {
-      table.fail(key, fmt::format("expected a file that ends in .toml, or one of {}", fmt::join(known, ", ")));
+      table.fail(key, fmt::format("expected a file that ends in .toml, or one of {}",
+                                  fmt::join(known, ", ")));
     }
     return surface_preset(name);
   }();
@@ -162,10 +168,12 @@ SurfaceFabric read_surface(const TomlTable& table, const char* key) {
 }
 
 SurfaceMethod read_surface_method(const TomlTable& table, const SurfaceFabric& fabric) {
-  if (table.choice("surface_method", {"sampled", "interactive"}, "sampled") == "sampled") return SurfaceMethod::kSampled;
+  if (table.choice("surface_method", {"sampled", "interactive"}, "sampled") == "sampled")
+    return SurfaceMethod::kSampled;
   if (!fabric.interactive) {
     table.fail("surface_method",
-               fmt::format("{} has no interactive form; fabrics of the model microcylinder without energy_safe have: {}",
+               fmt::format("{} has no interactive form; fabrics of the model microcylinder without "
+                           "energy_safe have: {}",
                            fabric.name, fmt::join(surface_preset_names("microcylinder"), ", ")));
   }
   return SurfaceMethod::kInteractive;
@@ -173,7 +181,8 @@ SurfaceMethod read_surface_method(const TomlTable& table, const SurfaceFabric& f
 
 ClothConfig read_cloth(const TomlTable& table) {
   ClothConfig cloth;
-  if (table.has("mesh") == table.has("flat_mm")) table.fail("mesh", "expected either mesh or flat_mm");
+  if (table.has("mesh") == table.has("flat_mm"))
+    table.fail("mesh", "expected either mesh or flat_mm");
   if (table.has("mesh")) {
     cloth.mesh = read_mesh(table);
     cloth.uv_size_mm = table.number("uv_size_mm", kSize);
@@ -182,7 +191,8 @@ ClothConfig read_cloth(const TomlTable& table) {
     cloth.flat_width_mm = size[0];
     cloth.flat_height_mm = size[1];
   }
-  if (table.has("fabric") == table.has("surface")) table.fail("fabric", "expected either fabric or surface");
+  if (table.has("fabric") == table.has("surface"))
+    table.fail("fabric", "expected either fabric or surface");
   if (table.has("surface")) {
     cloth.surface = read_surface(table, "surface");
     cloth.surface_method = read_surface_method(table, *cloth.surface);
@@ -220,7 +230,8 @@ SceneConfig read_scene_config(const TomlTable& document) {
   SceneConfig scene;
   scene.name = document.string("name");
   scene.background = color(document.number3("background", kLight, std::array<double, 3>{0, 0, 0}));
-  for (const TomlTable& table : document.tables("light")) scene.lights.push_back(read_light(table, scene.environment_files));
+  for (const TomlTable& table : document.tables("light"))
+    scene.lights.push_back(read_light(table, scene.environment_files));
   if (scene.lights.empty()) document.fail("light", "expected at least one [[light]]");
   for (const TomlTable& table : document.tables("cloth")) scene.cloths.push_back(read_cloth(table));
   if (scene.cloths.empty()) document.fail("cloth", "expected at least one [[cloth]]");

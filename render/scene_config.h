@@ -1,8 +1,8 @@
 #ifndef HEDDLE_RENDER_SCENE_CONFIG_H_
 #define HEDDLE_RENDER_SCENE_CONFIG_H_
-// What a scene TOML says: views, lights, pieces of cloth, black meshes, how to render. Keys, units and
-// ranges: configs/README.md. Lengths in millimetres, angles in radians after parsing. Errors: ConfigError
-// with its place. Tested in tests/render/scene_config_test.cpp.
+// What a scene TOML says: views, lights, pieces of cloth, black meshes, how to render. Keys, units
+// and ranges: configs/README.md. Lengths in millimetres, angles in radians after parsing. Errors:
+// ConfigError with its place. Tested in tests/render/scene_config_test.cpp.
 
 #include <array>
 #include <cstdint>
@@ -76,12 +76,14 @@ struct SurfaceFabric {
 struct ClothConfig {
   std::optional<MeshFile> mesh;  // an OBJ with UVs, or else a flat swatch
   double uv_size_mm = 0;         // flat cloth (mm) per unit of UV; meshes only
-  double flat_width_mm = 0;      // flat swatch centred on the world's origin, z = 0; x = weft, y = warp
+  // flat swatch centred on the world's origin, z = 0; x = weft, y = warp
+  double flat_width_mm = 0;
   double flat_height_mm = 0;
   std::filesystem::path fabric;  // fabric TOML; empty where a surface model draws the cloth
   std::optional<SurfaceFabric> surface;
   SurfaceMethod surface_method = SurfaceMethod::kSampled;
-  std::optional<SurfaceFabric> far_surface;  // fibers only: what a plan may draw instead where it is good enough
+  // fibers only: what a plan may draw instead where it is good enough
+  std::optional<SurfaceFabric> far_surface;
   bool underlay = false;  // a black copy of the cloth's underside just below it; fibers only
 };
 
@@ -96,13 +98,13 @@ struct ReferenceConfig {
 struct ViewConfig {
   std::string name;  // part of the file's name; empty for the view of [camera]
   CameraConfig camera;
-  int spp = 16;      // samples per pixel; even where paths are traced
+  int spp = 16;  // samples per pixel; even where paths are traced
   std::optional<ReferenceConfig> reference;
 };
 
 struct SceneConfig {
   std::string name;
-  std::vector<ViewConfig> views;     // that of [camera] first, then every [[view]]
+  std::vector<ViewConfig> views;  // that of [camera] first, then every [[view]]
   std::vector<Light> lights;
   std::vector<std::filesystem::path> environment_files;  // that the lights were read from
   Rgb background = Rgb(0, 0, 0);  // radiance seen by eye rays that hit nothing; lights nothing
@@ -111,7 +113,8 @@ struct SceneConfig {
   RenderMethod method = RenderMethod::kExact;
   int spp = 16;  // samples per pixel; even where paths are traced
   std::uint64_t seed = 1;
-  std::optional<double> shadow_sigma_mm;  // smoothing of global visibility; from the fabric where absent
+  // smoothing of global visibility; from the fabric where absent
+  std::optional<double> shadow_sigma_mm;
 };
 
 /// Reads a whole scene document, finish() included.

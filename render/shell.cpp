@@ -19,7 +19,8 @@ constexpr double kDegenerate = 1e-12;
 
 Mat3d edges(const std::vector<Vec3d>& points, const std::array<std::uint32_t, 4>& v) {
   Mat3d matrix;
-  for (int k = 0; k < 3; ++k) matrix.col(k) = points[v[static_cast<std::size_t>(k + 1)]] - points[v[0]];
+  for (int k = 0; k < 3; ++k)
+    matrix.col(k) = points[v[static_cast<std::size_t>(k + 1)]] - points[v[0]];
   return matrix;
 }
 
@@ -30,11 +31,13 @@ bool is_degenerate(const Mat3d& edges) {
 
 }  // namespace
 
-ClothMesh cloth_mesh_of(const ObjMesh& obj, const std::string& name, double mm_per_unit, double uv_size_mm) {
+ClothMesh cloth_mesh_of(const ObjMesh& obj, const std::string& name, double mm_per_unit,
+                        double uv_size_mm) {
   if (obj.triangles.empty()) throw FileError(name + ": the mesh has no faces");
   if (obj.uvs.empty()) throw FileError(name + ": cloth needs UVs, but the mesh has none");
   ClothMesh mesh;
-  // Normals are shared by all vertices at one position, so that the shell has no cracks at UV seams.
+  // Normals are shared by all vertices at one position, so that the shell has no cracks at UV
+  // seams.
   std::map<std::array<float, 3>, Vec3d> normal_at;
   std::map<std::array<float, 5>, std::uint32_t> welded;
   std::vector<std::uint32_t> index(obj.positions.size());
@@ -42,8 +45,8 @@ ClothMesh cloth_mesh_of(const ObjMesh& obj, const std::string& name, double mm_p
   for (std::size_t v = 0; v < obj.positions.size(); ++v) {
     const std::array<float, 3>& p = obj.positions[v];
     const std::array<float, 2>& uv = obj.uvs[v];
-    const auto [place, is_new] =
-        welded.try_emplace({p[0], p[1], p[2], uv[0], uv[1]}, static_cast<std::uint32_t>(position_of.size()));
+    const auto [place, is_new] = welded.try_emplace({p[0], p[1], p[2], uv[0], uv[1]},
+                                                    static_cast<std::uint32_t>(position_of.size()));
     index[v] = place->second;
     if (is_new) {
       position_of.push_back(p);
@@ -56,11 +59,13 @@ ClothMesh cloth_mesh_of(const ObjMesh& obj, const std::string& name, double mm_p
   for (const std::array<std::uint32_t, 3>& t : obj.triangles) {
     const std::array<std::uint32_t, 3> triangle = {index[t[0]], index[t[1]], index[t[2]]};
     // A triangle that welding folded into an edge covers nothing.
-    if (triangle[0] == triangle[1] || triangle[1] == triangle[2] || triangle[2] == triangle[0]) continue;
+    if (triangle[0] == triangle[1] || triangle[1] == triangle[2] || triangle[2] == triangle[0])
+      continue;
     mesh.triangles.push_back(triangle);
     if (!obj.normals.empty()) continue;
     const Vec3d& a = mesh.positions[triangle[0]];
-    const Vec3d doubled_area = (mesh.positions[triangle[1]] - a).cross(mesh.positions[triangle[2]] - a);
+    const Vec3d doubled_area =
+        (mesh.positions[triangle[1]] - a).cross(mesh.positions[triangle[2]] - a);
     for (const std::uint32_t v : triangle) normal_at[position_of[v]] += doubled_area;
   }
   for (const std::array<float, 3>& p : position_of) {
@@ -112,14 +117,15 @@ Shell::Shell(const ClothMesh& mesh, double z_min, double z_max)
     const std::uint32_t b = 2 * t[1];
     const std::uint32_t c = 2 * t[2];
     for (std::array<std::uint32_t, 4> v :
-         {std::array{a, b, c, c + 1}, std::array{a, b + 1, b, c + 1}, std::array{a, a + 1, b + 1, c + 1}}) {
+         {std::array{a, b, c, c + 1}, std::array{a, b + 1, b, c + 1},
+          std::array{a, a + 1, b + 1, c + 1}}) {
       if (is_odd) std::swap(v[2], v[3]);
       tets_.push_back({v, {kNone, kNone, kNone, kNone}});
       volume += edges(world_, v).determinant();
     }
   }
-  // Faces are wound against the normals throughout: turn all tetrahedra instead of calling all of them
-  // flipped.
+  // Faces are wound against the normals throughout: turn all tetrahedra instead of calling all of
+  // them flipped.
   if (volume < 0) {
     for (Tet& tet : tets_) std::swap(tet.vertex[2], tet.vertex[3]);
   }
@@ -140,7 +146,8 @@ Shell::Shell(const ClothMesh& mesh, double z_min, double z_max)
     flipped_count_ += flipped ? 1 : 0;
   }
 
-  // Faces with the same three vertices belong together; where not exactly two meet, the shell is open.
+  // Faces with the same three vertices belong together; where not exactly two meet, the shell is
+  // open.
   struct Face {
     std::array<std::uint32_t, 3> vertices;
     std::uint32_t id;
@@ -172,7 +179,8 @@ Shell::Shell(const ClothMesh& mesh, double z_min, double z_max)
   std::sort(boundary_faces_.begin(), boundary_faces_.end());
 
   // The same for the edges of the surface.
-  std::map<std::pair<std::uint32_t, std::uint32_t>, std::vector<std::pair<std::uint32_t, std::size_t>>>
+  std::map<std::pair<std::uint32_t, std::uint32_t>,
+           std::vector<std::pair<std::uint32_t, std::size_t>>>
       edge_sides;
   triangle_neighbours_.assign(triangles_.size(), {kNone, kNone, kNone});
   for (std::uint32_t t = 0; t < triangles_.size(); ++t) {
@@ -192,7 +200,8 @@ Shell::Shell(const ClothMesh& mesh, double z_min, double z_max)
 TriangleMesh Shell::boundary_mesh() const {
   TriangleMesh mesh;
   for (const Vec3d& p : world_) mesh.positions.push_back(p.cast<float>());
-  for (const std::uint32_t id : boundary_faces_) mesh.triangles.push_back(face_vertices(id / 4, id % 4));
+  for (const std::uint32_t id : boundary_faces_)
+    mesh.triangles.push_back(face_vertices(id / 4, id % 4));
   return mesh;
 }
 
@@ -218,8 +227,8 @@ Vec3d Shell::weights_in(std::uint32_t triangle, const Eigen::Vector2d& p) const 
 
 std::optional<std::uint32_t> Shell::find_triangle(std::uint32_t triangle,
                                                   const Eigen::Vector2d& fabric_xy) const {
-  // Each step crosses the edge that the point lies furthest behind, so the walk is short; folded UVs could
-  // make it circle, so it is capped.
+  // Each step crosses the edge that the point lies furthest behind, so the walk is short; folded
+  // UVs could make it circle, so it is capped.
   constexpr int kMaxSteps = 4096;
   for (int step = 0; step < kMaxSteps && triangle != kNone; ++step) {
     const Vec3d weights = weights_in(triangle, fabric_xy);

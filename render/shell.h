@@ -1,17 +1,20 @@
 #ifndef HEDDLE_RENDER_SHELL_H_
 #define HEDDLE_RENDER_SHELL_H_
-// The shell map: a cloth surface with UVs thickened along its vertex normals into tetrahedra, each with an
-// affine map between world space and fabric space (Porumbescu et al. 2005; Khungurn 2017, section 5.1). The
-// surface is the fabric's plane z = 0. World and fabric millimetres, in double: a fiber is 1e-5 of a drape.
+// The shell map: a cloth surface with UVs thickened along its vertex normals into tetrahedra, each
+// with an affine map between world space and fabric space (Porumbescu et al. 2005; Khungurn 2017,
+// section 5.1). The surface is the fabric's plane z = 0. World and fabric millimetres, in double: a
+// fiber is 1e-5 of a drape.
 //
-// Every triangle's prism is cut into 3 tetrahedra whose diagonals run from the bottom of the lower vertex
-// index to the top of the higher one, so that neighbours agree. Triangle t owns tetrahedra 3 t, 3 t + 1, 3 t
+// Every triangle's prism is cut into 3 tetrahedra whose diagonals run from the bottom of the lower
+// vertex index to the top of the higher one, so that neighbours agree. Triangle t owns tetrahedra 3
+// t, 3 t + 1, 3 t
 // + 2. Vertex v of the surface becomes 2 v (bottom) and 2 v + 1 (top).
 //
-// A ray walks from tetrahedron to tetrahedron. In the plane across the ray, the face it leaves by is decided
-// by the signs of cross products that are computed once per edge, up to their sign; so the walk has no gaps,
-// and as every step can be undone it cannot loop. Through a flipped tetrahedron the walk goes backwards along
-// the ray: nothing is visible there. Tested in tests/render/shell_test.cpp.
+// A ray walks from tetrahedron to tetrahedron. In the plane across the ray, the face it leaves by
+// is decided by the signs of cross products that are computed once per edge, up to their sign; so
+// the walk has no gaps, and as every step can be undone it cannot loop. Through a flipped
+// tetrahedron the walk goes backwards along the ray: nothing is visible there. Tested in
+// tests/render/shell_test.cpp.
 
 #include <array>
 #include <cstdint>
@@ -35,12 +38,14 @@ struct ClothMesh {
   std::vector<std::array<std::uint32_t, 3>> triangles;  // [triangle]
 };
 
-/// Vertices with equal position and UV become one; at a UV seam they stay apart (an open rim) and share their
-/// normal. Normals are the file's, averaged per position, or area-weighted face normals where the file has
-/// none. Errors: FileError naming `name` (no UVs, no triangles).
-ClothMesh cloth_mesh_of(const ObjMesh& obj, const std::string& name, double mm_per_unit, double uv_size_mm);
+/// Vertices with equal position and UV become one; at a UV seam they stay apart (an open rim) and
+/// share their normal. Normals are the file's, averaged per position, or area-weighted face normals
+/// where the file has none. Errors: FileError naming `name` (no UVs, no triangles).
+ClothMesh cloth_mesh_of(const ObjMesh& obj, const std::string& name, double mm_per_unit,
+                        double uv_size_mm);
 
-/// A flat swatch centred on the origin in which fabric space is world space, of cells * cells rectangles.
+/// A flat swatch centred on the origin in which fabric space is world space, of cells * cells
+/// rectangles.
 ClothMesh flat_cloth(double width_mm, double height_mm, std::uint32_t cells = 1);
 
 /// One straight piece of a ray inside one tetrahedron.
@@ -71,11 +76,13 @@ class Shell {
   double z_min() const { return z_min_; }
   double z_max() const { return z_max_; }
 
-  /// Tetrahedra turned inside out by folds tighter than the thickness; those without volume in either space.
+  /// Tetrahedra turned inside out by folds tighter than the thickness; those without volume in
+  /// either space.
   std::uint32_t flipped_count() const { return flipped_count_; }
   std::uint32_t degenerate_count() const { return degenerate_count_; }
 
-  /// Outer faces (top, bottom, rims): [face] 4 * tet + face, in the order of boundary_mesh()'s triangles.
+  /// Outer faces (top, bottom, rims): [face] 4 * tet + face, in the order of boundary_mesh()'s
+  /// triangles.
   const std::vector<std::uint32_t>& boundary_faces() const { return boundary_faces_; }
   TriangleMesh boundary_mesh() const;
   /// The underside, moved `gap_mm` further out.
@@ -85,23 +92,25 @@ class Shell {
   const Mat3& world_from_fabric(std::uint32_t tet) const { return maps_[tet].world_from_fabric; }
   const Mat3& fabric_from_world(std::uint32_t tet) const { return maps_[tet].fabric_from_world; }
 
-  /// The triangle that holds a fabric position, searched across edges from `triangle` on; nothing beyond a
-  /// rim.
-  std::optional<std::uint32_t> find_triangle(std::uint32_t triangle, const Eigen::Vector2d& fabric_xy) const;
+  /// The triangle that holds a fabric position, searched across edges from `triangle` on; nothing
+  /// beyond a rim.
+  std::optional<std::uint32_t> find_triangle(std::uint32_t triangle,
+                                             const Eigen::Vector2d& fabric_xy) const;
 
-  /// World position on the shell's top (kFace) or bottom (kBack) over a fabric position in `triangle`; the
-  /// normal points out of the shell.
+  /// World position on the shell's top (kFace) or bottom (kBack) over a fabric position in
+  /// `triangle`; the normal points out of the shell.
   struct SurfacePoint {
     Vec3d position;
     Vec3d normal;
   };
-  SurfacePoint surface_point(std::uint32_t triangle, const Eigen::Vector2d& fabric_xy, ClothSide side) const;
+  SurfacePoint surface_point(std::uint32_t triangle, const Eigen::Vector2d& fabric_xy,
+                             ClothSide side) const;
 
   enum class WalkEnd : std::uint8_t { kStopped, kLeft, kFailed };
 
-  /// Visits the intervals of the ray origin + t direction (unit) inward from boundary face `face` (an index
-  /// into boundary_faces); visit(interval) returns true to stop. A face that the ray leaves by gives kLeft at
-  /// once. A ray that misses the face by rounding is moved onto it.
+  /// Visits the intervals of the ray origin + t direction (unit) inward from boundary face `face`
+  /// (an index into boundary_faces); visit(interval) returns true to stop. A face that the ray
+  /// leaves by gives kLeft at once. A ray that misses the face by rounding is moved onto it.
   template <class Visit>
   WalkEnd walk_from_face(const Vec3d& origin, const Vec3d& direction, std::uint32_t face,
                          Visit&& visit) const;
@@ -141,7 +150,8 @@ class Shell {
     Vec3d origin, across, above, direction;
     double shift_x = 0, shift_y = 0;
   };
-  // A face with the ray through it, anticlockwise looking along the ray, and where the ray crosses it.
+  // A face with the ray through it, anticlockwise looking along the ray, and where the ray crosses
+  // it.
   struct Crossed {
     std::array<Seen, 3> corner;
     double t;
@@ -153,8 +163,8 @@ class Shell {
   static RayFrame ray_frame(const Vec3d& origin, const Vec3d& direction);
   Seen see(const RayFrame& frame, std::uint32_t vertex) const {
     const Vec3d offset = world_[vertex] - frame.origin;
-    return {vertex, offset.dot(frame.across) - frame.shift_x, offset.dot(frame.above) - frame.shift_y,
-            offset.dot(frame.direction)};
+    return {vertex, offset.dot(frame.across) - frame.shift_x,
+            offset.dot(frame.above) - frame.shift_y, offset.dot(frame.direction)};
   }
   // Twice the area of the triangle (ray, a, b); exactly antisymmetric.
   static double area(const Seen& a, const Seen& b) { return a.x * b.y - a.y * b.x; }
@@ -166,7 +176,8 @@ class Shell {
   static bool contains_ray(const std::array<Seen, 3>& c) {
     return is_left(c[0], c[1]) && is_left(c[1], c[2]) && is_left(c[2], c[0]);
   }
-  // Moves the ray to the point of the face nearest in barycentric terms; false where the face has no area.
+  // Moves the ray to the point of the face nearest in barycentric terms; false where the face has
+  // no area.
   static bool move_onto(RayFrame& frame, std::array<Seen, 3>& corner);
   Crossed cross(const std::array<Seen, 3>& corner) const;
   template <class Visit>
@@ -193,13 +204,14 @@ inline Shell::Crossed Shell::cross(const std::array<Seen, 3>& c) const {
   std::array<double, 3> weight = {area(c[1], c[2]), area(c[2], c[0]), area(c[0], c[1])};
   const double sum = weight[0] + weight[1] + weight[2];
   for (double& w : weight) w = sum > 0 ? w / sum : 1.0 / 3.0;
-  return {
-      c, weight[0] * c[0].z + weight[1] * c[1].z + weight[2] * c[2].z,
-      weight[0] * fabric_[c[0].vertex] + weight[1] * fabric_[c[1].vertex] + weight[2] * fabric_[c[2].vertex]};
+  return {c, weight[0] * c[0].z + weight[1] * c[1].z + weight[2] * c[2].z,
+          weight[0] * fabric_[c[0].vertex] + weight[1] * fabric_[c[1].vertex] +
+              weight[2] * fabric_[c[2].vertex]};
 }
 
 template <class Visit>
-Shell::WalkEnd Shell::walk(const RayFrame& frame, Crossed entry, std::uint32_t next, Visit&& visit) const {
+Shell::WalkEnd Shell::walk(const RayFrame& frame, Crossed entry, std::uint32_t next,
+                           Visit&& visit) const {
   // A walk crosses a face at most once in each sense.
   for (std::size_t step = 0; step <= 8 * tets_.size(); ++step) {
     if (next == kNone) return WalkEnd::kLeft;
@@ -238,12 +250,13 @@ Shell::WalkEnd Shell::walk(const RayFrame& frame, Crossed entry, std::uint32_t n
 }
 
 template <class Visit>
-Shell::WalkEnd Shell::walk_from_face(const Vec3d& origin, const Vec3d& direction, std::uint32_t face,
-                                     Visit&& visit) const {
+Shell::WalkEnd Shell::walk_from_face(const Vec3d& origin, const Vec3d& direction,
+                                     std::uint32_t face, Visit&& visit) const {
   RayFrame frame = ray_frame(origin, direction);
   const std::uint32_t id = boundary_faces_[face];
   const std::array<std::uint32_t, 3> outward = face_vertices(id / 4, id % 4);
-  std::array<Seen, 3> corner = {see(frame, outward[0]), see(frame, outward[2]), see(frame, outward[1])};
+  std::array<Seen, 3> corner = {see(frame, outward[0]), see(frame, outward[2]),
+                                see(frame, outward[1])};
   if (!(area(corner[0], corner[1]) + area(corner[1], corner[2]) + area(corner[2], corner[0]) > 0)) {
     return WalkEnd::kLeft;
   }
@@ -252,8 +265,9 @@ Shell::WalkEnd Shell::walk_from_face(const Vec3d& origin, const Vec3d& direction
 }
 
 template <class Visit>
-Shell::WalkEnd Shell::walk_from_inside(const Vec3d& origin, const Vec3d& direction, std::uint32_t tet,
-                                       const Vec3d& fabric_origin, Visit&& visit) const {
+Shell::WalkEnd Shell::walk_from_inside(const Vec3d& origin, const Vec3d& direction,
+                                       std::uint32_t tet, const Vec3d& fabric_origin,
+                                       Visit&& visit) const {
   RayFrame frame = ray_frame(origin, direction);
   const Tet& here = tets_[tet];
   std::array<Seen, 4> seen;

@@ -13,14 +13,15 @@ namespace {
 
 constexpr int kMaxLobes = 128;
 
-/// Weak lobes are left out; all of them together carry less than this share of the light. The visibility of
-/// the lobes is itself good to some per cent.
+/// Weak lobes are left out; all of them together carry less than this share of the light. The
+/// visibility of the lobes is itself good to some per cent.
 constexpr float kLeftOut = 3e-3F;
 
 /// A lobe of light whose deviation in azimuth is below this (radians of arc) is looked up once.
 constexpr float kNarrow = 0.1F;
 
-/// Share of a Gaussian of light about a direction at this signed distance from the edge of visibility that comes through.
+/// Share of a Gaussian of light about a direction at this signed distance from the edge of
+/// visibility that comes through.
 float share_within(float distance, float precision) {
   return 0.5F * (1 + std::erf(std::sqrt(0.5F * precision) * distance));
 }
@@ -44,13 +45,15 @@ Rgb SingleScattering::spherical_gaussian(const ShadingPoint& point, const Direct
   return (1 - share) * soft(point, axis, sharpness) + share * sharp(point, axis, sharpness);
 }
 
-Rgb SingleScattering::soft(const ShadingPoint& point, const DirectionPair& axis, float sharpness) const {
+Rgb SingleScattering::soft(const ShadingPoint& point, const DirectionPair& axis,
+                           float sharpness) const {
   assert(lobes_ != nullptr && lobes_->lobes() <= kMaxLobes);
   if (lobes_->sees_nothing[point.segment] != 0) return Rgb::Zero();
   const int lobes = lobes_->lobes();
   const float own = lobes_->sharpness;
   const float angle = float_from_half(lobes_->rotation[point.segment]);
-  const Mat3 turn = Eigen::AngleAxisf(angle, Vec3::UnitZ()).toRotationMatrix();  // lobe axes to fabric space
+  // lobe axes to fabric space
+  const Mat3 turn = Eigen::AngleAxisf(angle, Vec3::UnitZ()).toRotationMatrix();
   const Vec3 light = turn.transpose() * axis.fabric;
   const Half* weights = &lobes_->weights[static_cast<std::size_t>(point.segment) * lobes];
 
@@ -61,7 +64,8 @@ Rgb SingleScattering::soft(const ShadingPoint& point, const DirectionPair& axis,
   for (int q = 0; q < lobes; ++q) {
     const float n = (own * lobes_->axes[q] + sharpness * light).norm();
     // n - own - sharpness, without cancellation
-    const float exponent = -own * sharpness * (lobes_->axes[q] - light).squaredNorm() / (own + sharpness + n);
+    const float exponent =
+        -own * sharpness * (lobes_->axes[q] - light).squaredNorm() / (own + sharpness + n);
     product_sharpness[q] = n;
     carried[q] = float_from_half(weights[q]) * std::exp(exponent);
     total += carried[q];
@@ -81,7 +85,8 @@ Rgb SingleScattering::soft(const ShadingPoint& point, const DirectionPair& axis,
   return sum / (sg_mass(own) * sg_mass(sharpness));
 }
 
-Rgb SingleScattering::sharp(const ShadingPoint& point, const DirectionPair& axis, float sharpness) const {
+Rgb SingleScattering::sharp(const ShadingPoint& point, const DirectionPair& axis,
+                            float sharpness) const {
   assert(ssdf_ != nullptr);
   if (ssdf_->sees_nothing[point.segment] != 0) return Rgb::Zero();
   const Mat3 to_fiber = frame_about(point.tangent.world).transpose();
@@ -90,7 +95,8 @@ Rgb SingleScattering::sharp(const ShadingPoint& point, const DirectionPair& axis
   const BcsdfTable& bcsdf = materials_[point.material];
   if (gamma_ == SgMethod::kPrinted) {
     const float distance = ssdf_->signed_distance(point.segment, axis.fabric);
-    return share_within(distance, sharpness) / sg_mass(sharpness) * scattered(bcsdf, light, sharpness, wo);
+    return share_within(distance, sharpness) / sg_mass(sharpness) *
+           scattered(bcsdf, light, sharpness, wo);
   }
   const Mat3 to_fabric = frame_about(point.tangent.fabric);
   const Vec3 local = to_fabric.transpose() * axis.fabric;
@@ -98,18 +104,21 @@ Rgb SingleScattering::sharp(const ShadingPoint& point, const DirectionPair& axis
   const float phi = std::atan2(local.z(), local.y());
   Rgb sum = Rgb::Zero();
   for (const BcsdfTable::LobeResponse& lobe : bcsdf.sg_scatter_by_lobe(light, sharpness, wo)) {
-    if (lobe.value.maxCoeff() > 0) sum += lobe.value * visible_share(point.segment, to_fabric, theta, phi, lobe);
+    if (lobe.value.maxCoeff() > 0)
+      sum += lobe.value * visible_share(point.segment, to_fabric, theta, phi, lobe);
   }
   return sum / sg_mass(sharpness);
 }
 
-float SingleScattering::visible_share(std::uint32_t segment, const Mat3& to_fabric, float axis_theta, float axis_phi,
+float SingleScattering::visible_share(std::uint32_t segment, const Mat3& to_fabric,
+                                      float axis_theta, float axis_phi,
                                       const BcsdfTable::LobeResponse& lobe) const {
   const float theta = std::clamp(axis_theta + lobe.theta_shift, -0.5F * kPif, 0.5F * kPif);
   const float phi = axis_phi + lobe.turn;
   const float cosine = std::cos(theta);
   const auto distance_at = [&](float turn) {
-    const Vec3 direction(std::sin(theta), cosine * std::cos(phi + turn), cosine * std::sin(phi + turn));
+    const Vec3 direction(std::sin(theta), cosine * std::cos(phi + turn),
+                         cosine * std::sin(phi + turn));
     return ssdf_->signed_distance(segment, to_fabric * direction);
   };
   const float centre = distance_at(0);
@@ -121,7 +130,8 @@ float SingleScattering::visible_share(std::uint32_t segment, const Mat3& to_fabr
   }
   // The distance is taken as linear between three azimuths, and looked up at eight between them.
   using Lanes = Eigen::Array<float, 8, 1>;
-  static const Lanes kDeviations{-1.663F, -0.961F, -0.530F, -0.170F, 0.170F, 0.530F, 0.961F, 1.663F};
+  static const Lanes kDeviations{-1.663F, -0.961F, -0.530F, -0.170F,
+                                 0.170F,  0.530F,  0.961F,  1.663F};
   const float reach = kDeviations[7];
   const float before = distance_at(-reach * deviation);
   const float after = distance_at(reach * deviation);
@@ -133,9 +143,11 @@ float SingleScattering::visible_share(std::uint32_t segment, const Mat3& to_fabr
   return share / static_cast<float>(kDeviations.size());
 }
 
-Rgb SingleScattering::scattered(const BcsdfTable& bcsdf, const Vec3& axis, float sharpness, const Vec3& wo) const {
+Rgb SingleScattering::scattered(const BcsdfTable& bcsdf, const Vec3& axis, float sharpness,
+                                const Vec3& wo) const {
   if (gamma_ == SgMethod::kDefault) return bcsdf.sg_scatter(axis, sharpness, wo);
-  return sg_scatter(bcsdf.fiber(), {axis.cast<double>().normalized(), sharpness}, wo.cast<double>(), gamma_)
+  return sg_scatter(bcsdf.fiber(), {axis.cast<double>().normalized(), sharpness}, wo.cast<double>(),
+                    gamma_)
       .cast<float>();
 }
 

@@ -9,7 +9,8 @@
 namespace heddle {
 namespace {
 
-/// Least cosine between the eye and the normal, about 89.4 degrees: the models hold nothing beyond the horizon.
+/// Least cosine between the eye and the normal, about 89.4 degrees: the models hold nothing beyond
+/// the horizon.
 constexpr double kLeastCosine = 0.01;
 
 /// The part of `direction` across z, or any direction across z where nothing is left of it.
@@ -40,7 +41,8 @@ SurfaceCloth::SurfaceCloth(std::shared_ptr<const SurfaceModel> model, ClothMesh 
     const Vec3d edge_c = mesh_.positions[c] - mesh_.positions[a];
     const Eigen::Vector2d uv_b = mesh_.fabric[b] - mesh_.fabric[a];
     const Eigen::Vector2d uv_c = mesh_.fabric[c] - mesh_.fabric[a];
-    // Solution of edge = du * uv.x + dv * uv.y, times the size of the determinant: weighted by the area in UV.
+    // Solution of edge = du * uv.x + dv * uv.y, times the size of the determinant: weighted by the
+    // area in UV.
     const double sign = uv_b.x() * uv_c.y() < uv_b.y() * uv_c.x() ? -1 : 1;
     for (const std::uint32_t vertex : {a, b, c}) {
       tangents_[vertex] += sign * (uv_c.y() * edge_b - uv_b.y() * edge_c);
@@ -57,8 +59,8 @@ TriangleMesh SurfaceCloth::triangle_mesh() const {
 }
 
 Mat3d SurfaceCloth::vertex_frame(std::uint32_t vertex, ClothSide side) const {
-  return patch_frame(tangents_[vertex],
-                     side == ClothSide::kFace ? mesh_.normals[vertex] : Vec3d(-mesh_.normals[vertex]));
+  return patch_frame(tangents_[vertex], side == ClothSide::kFace ? mesh_.normals[vertex]
+                                                                 : Vec3d(-mesh_.normals[vertex]));
 }
 
 SurfaceHit SurfaceCloth::hit(std::uint32_t triangle, double u, double v, const Vec3& ray_direction,
@@ -71,7 +73,9 @@ SurfaceHit SurfaceCloth::hit(std::uint32_t triangle, double u, double v, const V
   SurfaceHit hit;
   hit.model = model_.get();
   hit.position = interpolate(mesh_.positions);
-  hit.normal = (mesh_.positions[b] - mesh_.positions[a]).cross(mesh_.positions[c] - mesh_.positions[a]).normalized();
+  hit.normal = (mesh_.positions[b] - mesh_.positions[a])
+                   .cross(mesh_.positions[c] - mesh_.positions[a])
+                   .normalized();
   if (hit.normal.dot(wo) < 0) hit.normal = -hit.normal;
 
   Vec3d z = interpolate(mesh_.normals).normalized();
@@ -84,13 +88,15 @@ SurfaceHit SurfaceCloth::hit(std::uint32_t triangle, double u, double v, const V
   hit.vertex_weights = {1 - u - v, u, v};
 
   const Eigen::Vector2d fabric = interpolate(mesh_.fabric);
-  const double along_y = interpolate(bitangents_).dot(hit.world_from_patch.col(1)) < 0 ? -fabric.y() : fabric.y();
-  hit.point = {Vec2(static_cast<float>(fabric.x()), static_cast<float>(along_y)), static_cast<float>(footprint_mm)};
+  const double along_y =
+      interpolate(bitangents_).dot(hit.world_from_patch.col(1)) < 0 ? -fabric.y() : fabric.y();
+  hit.point = {Vec2(static_cast<float>(fabric.x()), static_cast<float>(along_y)),
+               static_cast<float>(footprint_mm)};
   return hit;
 }
 
-Rgb surface_direct_light(const SurfaceHit& hit, const Vec3& wo, std::span<const Light> lights, LightEstimator estimator,
-                         RandomStream& random, const OpenTowards& open) {
+Rgb surface_direct_light(const SurfaceHit& hit, const Vec3& wo, std::span<const Light> lights,
+                         LightEstimator estimator, RandomStream& random, const OpenTowards& open) {
   const SurfaceModel& model = *hit.model;
   const Mat3d patch_from_world = hit.world_from_patch.transpose();
   const Vec3d local_out = patch_from_world * wo.cast<double>();
@@ -104,19 +110,22 @@ Rgb surface_direct_light(const SurfaceHit& hit, const Vec3& wo, std::span<const 
     Rgb value = incoming.weight * model.reflected(hit.point, local_in, local_out).cast<float>();
     if ((value == 0).all()) continue;
     if (estimator == LightEstimator::kCombined && !light.is_directional()) {
-      value *= power_heuristic(incoming.pdf, model.pdf(hit.point, local_in.cast<float>(), local_out.cast<float>()));
+      value *= power_heuristic(
+          incoming.pdf, model.pdf(hit.point, local_in.cast<float>(), local_out.cast<float>()));
     }
     if (open(incoming.direction)) sum += value;
   }
   if (!any_gaussian || estimator == LightEstimator::kShadowRays) return sum;
 
-  const std::optional<SurfaceSample> sample = model.sample(hit.point, local_out.cast<float>(), random);
+  const std::optional<SurfaceSample> sample =
+      model.sample(hit.point, local_out.cast<float>(), random);
   if (!sample) return sum;
   const Vec3 direction = (hit.world_from_patch * sample->wi.cast<double>()).cast<float>();
   Rgb radiance = Rgb::Zero();
   for (const Light& light : lights) {
-    const float weight =
-        estimator == LightEstimator::kCombined ? power_heuristic(sample->pdf, light_pdf(light, direction)) : 1;
+    const float weight = estimator == LightEstimator::kCombined
+                             ? power_heuristic(sample->pdf, light_pdf(light, direction))
+                             : 1;
     radiance += weight * light_radiance(light, direction);
   }
   const Rgb value = sample->weight * radiance;

@@ -1,14 +1,15 @@
 #ifndef HEDDLE_RENDER_SURFACE_CLOTH_H_
 #define HEDDLE_RENDER_SURFACE_CLOTH_H_
-// A piece of cloth without fibers: a mesh that a surface model draws, lit directly. Light that other cloth scatters onto it, and
-// light that it scatters on, is left out.
+// A piece of cloth without fibers: a mesh that a surface model draws, lit directly. Light that
+// other cloth scatters onto it, and light that it scatters on, is left out.
 //
-// Patch frame of a point (surface_model.h): z = the interpolated normal of the side that is looked at, x = the way that u grows,
-// made perpendicular to z, y = z x x; right-handed from both sides and for mirrored UVs too. position_mm runs along the frame: its
-// y falls with v where y points against it. So the back shows what the face would show there: the model has one face.
+// Patch frame of a point (surface_model.h): z = the interpolated normal of the side that is looked
+// at, x = the way that u grows, made perpendicular to z, y = z x x; right-handed from both sides
+// and for mirrored UVs too. position_mm runs along the frame: its y falls with v where y points
+// against it. So the back shows what the face would show there: the model has one face.
 //
-// Where an interpolated normal turns away from the eye though its triangle does not, it is bent back to the eye
-// (kLeastCosine). Tested in tests/render/surface_cloth_test.cpp.
+// Where an interpolated normal turns away from the eye though its triangle does not, it is bent
+// back to the eye (kLeastCosine). Tested in tests/render/surface_cloth_test.cpp.
 
 #include <array>
 #include <cstdint>
@@ -45,26 +46,30 @@ class SurfaceCloth {
 
   std::size_t vertex_count() const { return mesh_.positions.size(); }
   const Vec3d& vertex_position(std::uint32_t vertex) const { return mesh_.positions[vertex]; }
-  /// The patch frame at a vertex, seen from one side: hits in between interpolate what it is made of.
+  /// The patch frame at a vertex, seen from one side: hits in between interpolate what it is made
+  /// of.
   Mat3d vertex_frame(std::uint32_t vertex, ClothSide side) const;
 
   /// The point (1 - u - v) a + u b + v c of a triangle a, b, c, seen by a ray with that direction.
-  SurfaceHit hit(std::uint32_t triangle, double u, double v, const Vec3& ray_direction, double footprint_mm) const;
+  SurfaceHit hit(std::uint32_t triangle, double u, double v, const Vec3& ray_direction,
+                 double footprint_mm) const;
 
  private:
   std::shared_ptr<const SurfaceModel> model_;
   ClothMesh mesh_;
-  std::vector<Vec3d> tangents_;    // [vertex] world direction in which u grows, mean over its triangles
+  // [vertex] world direction in which u grows, mean over its triangles
+  std::vector<Vec3d> tangents_;
   std::vector<Vec3d> bitangents_;  // [vertex] the same of v
 };
 
 /// Is the hit point open towards a world direction?
 using OpenTowards = std::function<bool(const Vec3& direction)>;
 
-/// Radiance that leaves the hit towards `wo` (world) of light that arrives straight from the lights: one shadow ray per light,
-/// and one for a direction drawn from the model that stands for all Gaussian lights.
-Rgb surface_direct_light(const SurfaceHit& hit, const Vec3& wo, std::span<const Light> lights, LightEstimator estimator,
-                         RandomStream& random, const OpenTowards& open);
+/// Radiance that leaves the hit towards `wo` (world) of light that arrives straight from the
+/// lights: one shadow ray per light, and one for a direction drawn from the model that stands for
+/// all Gaussian lights.
+Rgb surface_direct_light(const SurfaceHit& hit, const Vec3& wo, std::span<const Light> lights,
+                         LightEstimator estimator, RandomStream& random, const OpenTowards& open);
 
 }  // namespace heddle
 

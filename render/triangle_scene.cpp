@@ -20,7 +20,8 @@ struct CollectContext {
 // Notes the triangle and rejects the hit, so that the traversal goes on to the end of the ray.
 void collect(const RTCFilterFunctionNArguments* args) {
   auto* collector = reinterpret_cast<CollectContext*>(args->context);
-  collector->crossings->push_back({RTCRayN_tfar(args->ray, args->N, 0), RTCHitN_geomID(args->hit, args->N, 0),
+  collector->crossings->push_back({RTCRayN_tfar(args->ray, args->N, 0),
+                                   RTCHitN_geomID(args->hit, args->N, 0),
                                    RTCHitN_primID(args->hit, args->N, 0)});
   args->valid[0] = 0;
 }
@@ -47,7 +48,8 @@ struct TriangleScene::Impl {
   std::size_t triangle_count = 0;
 };
 
-TriangleScene::TriangleScene(const std::vector<TriangleMesh>& meshes) : impl_(std::make_unique<Impl>()) {
+TriangleScene::TriangleScene(const std::vector<TriangleMesh>& meshes)
+    : impl_(std::make_unique<Impl>()) {
   impl_->device = rtcNewDevice(nullptr);
   if (impl_->device == nullptr) throw std::bad_alloc();
   impl_->scene = rtcNewScene(impl_->device);
@@ -56,12 +58,14 @@ TriangleScene::TriangleScene(const std::vector<TriangleMesh>& meshes) : impl_(st
     RTCGeometry geometry = rtcNewGeometry(impl_->device, RTC_GEOMETRY_TYPE_TRIANGLE);
     void* vertices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
                                              sizeof(Vec3), mesh.positions.size());
-    void* indices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                                            sizeof(std::array<std::uint32_t, 3>), mesh.triangles.size());
+    void* indices =
+        rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                sizeof(std::array<std::uint32_t, 3>), mesh.triangles.size());
     if (!mesh.positions.empty())
       std::memcpy(vertices, mesh.positions.data(), mesh.positions.size() * sizeof(Vec3));
     if (!mesh.triangles.empty()) {
-      std::memcpy(indices, mesh.triangles.data(), mesh.triangles.size() * sizeof(mesh.triangles[0]));
+      std::memcpy(indices, mesh.triangles.data(),
+                  mesh.triangles.size() * sizeof(mesh.triangles[0]));
     }
     impl_->triangle_count += mesh.triangles.size();
     rtcCommitGeometry(geometry);
@@ -78,7 +82,8 @@ TriangleScene::~TriangleScene() {
   rtcReleaseDevice(impl_->device);
 }
 
-std::optional<TriangleScene::Hit> TriangleScene::intersect(const Vec3& origin, const Vec3& direction,
+std::optional<TriangleScene::Hit> TriangleScene::intersect(const Vec3& origin,
+                                                           const Vec3& direction,
                                                            float t_max) const {
   if (impl_->triangle_count == 0) return {};
   RTCIntersectContext context;

@@ -1,8 +1,9 @@
 #ifndef HEDDLE_RENDER_TRIANGLE_SCENE_H_
 #define HEDDLE_RENDER_TRIANGLE_SCENE_H_
-// Ray queries on triangle meshes in world space (millimetres): the meshes of a scene, and the outer faces of
-// its cloth shells. The only place that includes Embree for triangles. Float positions: good to
-// about 1e-7 of their distance from the origin. Tested in tests/render/triangle_scene_test.cpp.
+// Ray queries on triangle meshes in world space (millimetres): the meshes of a scene, and the outer
+// faces of its cloth shells. The only place that includes Embree for triangles. Float positions:
+// good to about 1e-7 of their distance from the origin. Tested in
+// tests/render/triangle_scene_test.cpp.
 
 #include <array>
 #include <cstdint>
@@ -36,7 +37,8 @@ class TriangleScene {
     float u, v;  // the point is (1 - u - v) a + u b + v c of the triangle a, b, c
   };
   /// The first triangle in (0, t_max]; direction of unit length.
-  std::optional<Hit> intersect(const Vec3& origin, const Vec3& direction, float t_max = kInfinity) const;
+  std::optional<Hit> intersect(const Vec3& origin, const Vec3& direction,
+                               float t_max = kInfinity) const;
   bool occluded(const Vec3& origin, const Vec3& direction, float t_max = kInfinity) const;
 
   struct Crossing {
@@ -45,7 +47,8 @@ class TriangleScene {
     std::uint32_t triangle;
   };
   /// Every triangle crossed in [0, t_max], ordered by (t, mesh, triangle). `result` is overwritten.
-  void crossings(const Vec3& origin, const Vec3& direction, float t_max, std::vector<Crossing>& result) const;
+  void crossings(const Vec3& origin, const Vec3& direction, float t_max,
+                 std::vector<Crossing>& result) const;
 
  private:
   struct Impl;

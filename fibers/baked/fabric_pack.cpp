@@ -22,8 +22,9 @@ constexpr int kFormatVersion = 1;
 constexpr char kChecksumKey[] = "manifest_xxh3_128";
 constexpr std::uintmax_t kMaxManifestBytes = 1 << 20;
 
-constexpr std::array<std::string_view, 5> kKnownFiles = {"fibers.safetensors", "ssdf.safetensors", "sg.safetensors",
-                                                         "transfer.safetensors", "volume.vdb"};
+constexpr std::array<std::string_view, 5> kKnownFiles = {"fibers.safetensors", "ssdf.safetensors",
+                                                         "sg.safetensors", "transfer.safetensors",
+                                                         "volume.vdb"};
 
 bool is_known_file(std::string_view name) {
   return std::find(kKnownFiles.begin(), kKnownFiles.end(), name) != kKnownFiles.end();
@@ -56,11 +57,13 @@ PackManifest from_json(const Json& document, const std::string& path) {
   if (document.at("format") != kFormatName) throw FileError(path + ": not a pack manifest");
   if (document.at("version") != kFormatVersion) {
     throw FileError(
-        fmt::format("{}: written in pack layout {}, this program reads layout {}; run `heddle precompute` again", path,
-                    document.at("version").dump(), kFormatVersion));
+        fmt::format("{}: written in pack layout {}, this program reads layout {}; run `heddle "
+                    "precompute` again",
+                    path, document.at("version").dump(), kFormatVersion));
   }
   if (document.at(kChecksumKey) != manifest_checksum(document)) {
-    throw FileError(path + ": the manifest was changed after it was written (its own checksum differs)");
+    throw FileError(path +
+                    ": the manifest was changed after it was written (its own checksum differs)");
   }
   PackManifest manifest;
   manifest.name = document.at("name").get<std::string>();
@@ -69,7 +72,8 @@ PackManifest from_json(const Json& document, const std::string& path) {
   manifest.light_from_both_sides = document.at("light_from") == "both";
   manifest.counts = document.at("counts").get<std::map<std::string, std::uint64_t>>();
   for (const auto& [name, file] : document.at("files").items()) {
-    manifest.files[name] = {file.at("bytes").get<std::uint64_t>(), file.at("xxh3_128").get<std::string>()};
+    manifest.files[name] = {file.at("bytes").get<std::uint64_t>(),
+                            file.at("xxh3_128").get<std::string>()};
   }
   return manifest;
 }
@@ -83,7 +87,8 @@ PackManifest read_manifest(const std::filesystem::path& folder) {
   const std::vector<std::byte> bytes = read_whole_file(path);
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   if (is_nested_too_deeply(text)) {
-    throw FileError(fmt::format("{}: not a pack manifest: JSON nested deeper than {}", path.string(), kMaxJsonDepth));
+    throw FileError(fmt::format("{}: not a pack manifest: JSON nested deeper than {}",
+                                path.string(), kMaxJsonDepth));
   }
   try {
     return from_json(Json::parse(text), path.string());
@@ -108,8 +113,8 @@ PackManifest read_verified_manifest(const std::filesystem::path& folder) {
   for (const auto& [name, file] : manifest.files) {
     // A closed list of names also keeps paths such as "../x" out.
     if (!is_known_file(name)) {
-      throw FileError(fmt::format("{}: names a file that is no part of a pack: {}", (folder / kManifestName).string(),
-                                  Json(name).dump()));
+      throw FileError(fmt::format("{}: names a file that is no part of a pack: {}",
+                                  (folder / kManifestName).string(), Json(name).dump()));
     }
   }
   if (!manifest.files.contains("fibers.safetensors")) {
@@ -127,13 +132,14 @@ FabricPack load_pack(const std::filesystem::path& folder) {
   pack.key = manifest.key;
   pack.light_from_both_sides = manifest.light_from_both_sides;
   pack.exemplar = read_exemplar(folder / "fibers.safetensors");
-  for (const FiberScattering& scattering : pack.exemplar.scattering) pack.materials.emplace_back(scattering);
+  for (const FiberScattering& scattering : pack.exemplar.scattering)
+    pack.materials.emplace_back(scattering);
 
   const std::size_t segments = pack.exemplar.segment_count();
   const auto require_rows = [&](std::size_t rows, const std::string& name) {
     if (rows != segments) {
-      throw FileError(
-          fmt::format("{}: holds {} segments, the fibers have {}", (folder / name).string(), rows, segments));
+      throw FileError(fmt::format("{}: holds {} segments, the fibers have {}",
+                                  (folder / name).string(), rows, segments));
     }
   };
   if (manifest.files.contains("ssdf.safetensors")) {
@@ -153,8 +159,8 @@ FabricPack load_pack(const std::filesystem::path& folder) {
     pack.volume = read_id_volume(folder / "volume.vdb");
     for (const std::int32_t id : pack.volume->ids) {
       if (id < -1 || (id >= 0 && static_cast<std::size_t>(id) >= segments)) {
-        throw FileError(
-            fmt::format("{}: segment id {} of {} segments", (folder / "volume.vdb").string(), id, segments));
+        throw FileError(fmt::format("{}: segment id {} of {} segments",
+                                    (folder / "volume.vdb").string(), id, segments));
       }
     }
   }

@@ -1,9 +1,10 @@
 #ifndef HEDDLE_FIBERS_BAKED_FABRIC_PACK_H_
 #define HEDDLE_FIBERS_BAKED_FABRIC_PACK_H_
-// A pack: one folder that holds everything a renderer needs of one fabric, and a manifest.json with the size and the
-// XXH3-128 of every other file (and of itself). Files: fibers.safetensors always; ssdf.safetensors, sg.safetensors,
-// transfer.safetensors and volume.vdb where the pack was made with them.
-// Checks, in this order, before any file but the manifest is opened; the first that fails is the message:
+// A pack: one folder that holds everything a renderer needs of one fabric, and a manifest.json with
+// the size and the XXH3-128 of every other file (and of itself). Files: fibers.safetensors always;
+// ssdf.safetensors, sg.safetensors, transfer.safetensors and volume.vdb where the pack was made
+// with them. Checks, in this order, before any file but the manifest is opened; the first that
+// fails is the message:
 //   1. manifest.json is JSON in the layout of this version and its own checksum holds;
 //   2. every file name is a plain name of a file this version knows;
 //   3. every file exists and has the size stated;
@@ -34,8 +35,9 @@ struct PackManifest {
   std::string key;              // of the pack stage
   std::string program_version;  // that wrote it
   bool light_from_both_sides = false;
-  std::map<std::string, std::uint64_t> counts;  // "fibers", "segments", "cells"; for people and for `heddle check`
-  std::map<std::string, FileSeal> files;        // by file name, without the manifest
+  // "fibers", "segments", "cells"; for people and for `heddle check`
+  std::map<std::string, std::uint64_t> counts;
+  std::map<std::string, FileSeal> files;  // by file name, without the manifest
 };
 
 struct FabricPack {
@@ -49,11 +51,11 @@ struct FabricPack {
   std::optional<Transfer> transfer;
   std::vector<Vec3> bundle_tangent;  // [segment], where the transfer has cones
   std::optional<IdVolume> volume;
-  std::vector<BcsdfTable> materials;           // [material]
+  std::vector<BcsdfTable> materials;  // [material]
 };
 
-/// Hashes the files named in `manifest.files` inside `folder` (their sizes and checksums are filled in) and writes
-/// manifest.json, atomically, last.
+/// Hashes the files named in `manifest.files` inside `folder` (their sizes and checksums are filled
+/// in) and writes manifest.json, atomically, last.
 void write_manifest(const std::filesystem::path& folder, PackManifest manifest);
 
 /// Is this the name of a file that a pack may hold, the manifest included?

@@ -25,7 +25,8 @@ std::size_t within_brick(int x, int y, int z) {
 
 IdBricks::IdBricks(const IdVolume& volume)
     : size_(volume.size),
-      bricks_{brick_count(volume.size[0]), brick_count(volume.size[1]), brick_count(volume.size[2])} {
+      bricks_{brick_count(volume.size[0]), brick_count(volume.size[1]),
+              brick_count(volume.size[2])} {
   for (int a = 0; a < 3; ++a) {
     assert(size_[a] > 0 && volume.voxel_mm[a] > 0);
     origin_[a] = static_cast<float>(volume.origin_mm[a]);
@@ -69,7 +70,8 @@ std::optional<FiberHit> IdBricks::first_hit(const Ray& ray) const {
   double slope[3];
   double inverse[3];
   for (int a = 0; a < 3; ++a) {
-    origin[a] = (static_cast<double>(ray.origin[a]) - static_cast<double>(origin_[a])) / voxel_mm_[a];
+    origin[a] =
+        (static_cast<double>(ray.origin[a]) - static_cast<double>(origin_[a])) / voxel_mm_[a];
     slope[a] = static_cast<double>(ray.direction[a]) / voxel_mm_[a];
     inverse[a] = 1 / slope[a];
   }
@@ -87,13 +89,16 @@ std::optional<FiberHit> IdBricks::first_hit(const Ray& ray) const {
   }
   if (!(t <= t_end)) return {};
   // Start in tile (0, 0).
-  for (int a = 0; a < 2; ++a) origin[a] -= std::floor((origin[a] + t * slope[a]) / size_[a]) * size_[a];
+  for (int a = 0; a < 2; ++a)
+    origin[a] -= std::floor((origin[a] + t * slope[a]) / size_[a]) * size_[a];
 
-  // Slices across the axis along which the ray passes the most voxels; each is looked at where the ray meets its middle.
+  // Slices across the axis along which the ray passes the most voxels; each is looked at where the
+  // ray meets its middle.
   int axis = std::abs(slope[0]) >= std::abs(slope[1]) ? 0 : 1;
   if (std::abs(slope[2]) >= std::abs(slope[axis])) axis = 2;
   const bool ascending = slope[axis] > 0;
-  const auto slice_from = [&](double at) {  // first slice whose middle is not before the parameter `at`
+  // first slice whose middle is not before the parameter `at`
+  const auto slice_from = [&](double at) {
     const double position = origin[axis] + at * slope[axis] - 0.5;
     return static_cast<int>(ascending ? std::ceil(position) : std::floor(position));
   };
@@ -114,10 +119,13 @@ std::optional<FiberHit> IdBricks::first_hit(const Ray& ray) const {
       }
     }
     const std::uint32_t start =
-        brick_start_[(static_cast<std::size_t>(wrapped[2] / kEdge) * bricks_[1] + wrapped[1] / kEdge) * bricks_[0] +
+        brick_start_[(static_cast<std::size_t>(wrapped[2] / kEdge) * bricks_[1] +
+                      wrapped[1] / kEdge) *
+                         bricks_[0] +
                      wrapped[0] / kEdge];
     if (start != kEmptyBrick) {
-      const std::int32_t id = ids_[start + within_brick(wrapped[0] % kEdge, wrapped[1] % kEdge, wrapped[2] % kEdge)];
+      const std::int32_t id =
+          ids_[start + within_brick(wrapped[0] % kEdge, wrapped[1] % kEdge, wrapped[2] % kEdge)];
       if (id >= 0)
         return FiberHit{static_cast<float>(std::max(t, static_cast<double>(ray.t_min))),
                         static_cast<std::uint32_t>(id)};
@@ -135,7 +143,8 @@ std::optional<FiberHit> IdBricks::first_hit(const Ray& ray) const {
     if (!(t_exit <= t_end)) return {};
     const int next = slice_from(t_exit);
     // At least one slice further, and not past the limit.
-    slice = ascending ? std::clamp(next, slice + 1, last_slice) : std::clamp(next, last_slice, slice - 1);
+    slice = ascending ? std::clamp(next, slice + 1, last_slice)
+                      : std::clamp(next, last_slice, slice - 1);
   }
   return {};
 }

@@ -1,11 +1,11 @@
 #ifndef HEDDLE_FIBERS_BAKED_ID_BRICKS_H_
 #define HEDDLE_FIBERS_BAKED_ID_BRICKS_H_
-// The segment-id volume of one tile as 8^3 bricks, marched by a ray through endless copies of the tile; empty bricks are
-// skipped in one step. Fabric space, millimetres.
-// The volume is sampled once per slice of voxels, across the axis along which the ray passes the most of them, where the ray
-// meets the slice's middle (Khungurn 2017, section 5.1, samples at equal distances). Taking every voxel that the ray touches
-// makes fibers look thicker the more obliquely they are seen: single scattering of cotton came out 5 % too bright.
-// Tested in tests/fibers/baked/id_bricks_test.cpp.
+// The segment-id volume of one tile as 8^3 bricks, marched by a ray through endless copies of the
+// tile; empty bricks are skipped in one step. Fabric space, millimetres. The volume is sampled once
+// per slice of voxels, across the axis along which the ray passes the most of them, where the ray
+// meets the slice's middle (Khungurn 2017, section 5.1, samples at equal distances). Taking every
+// voxel that the ray touches makes fibers look thicker the more obliquely they are seen: single
+// scattering of cotton came out 5 % too bright. Tested in tests/fibers/baked/id_bricks_test.cpp.
 
 #include <array>
 #include <cstdint>
@@ -22,7 +22,8 @@ class IdBricks {
  public:
   explicit IdBricks(const IdVolume& volume);
 
-  /// First sample in [t_min, t_max] in a filled voxel, and the voxel's segment. Gives up after TileScene::kMaxTiles tiles.
+  /// First sample in [t_min, t_max] in a filled voxel, and the voxel's segment. Gives up after
+  /// TileScene::kMaxTiles tiles.
   std::optional<FiberHit> first_hit(const Ray& ray) const;
 
   std::array<int, 3> size() const { return size_; }

@@ -15,13 +15,14 @@ namespace {
 
 constexpr std::size_t kMostComponents = 128;
 
-// A half's exponent and mantissa, moved to a float's places, are the value times 2^-112, subnormals included.
-// Written out because the compiler makes a vector loop of it. Finite values only.
+// A half's exponent and mantissa, moved to a float's places, are the value times 2^-112, subnormals
+// included. Written out because the compiler makes a vector loop of it. Finite values only.
 void decode_halfs(const Half* halfs, std::size_t count, float* values) {
   for (std::size_t i = 0; i < count; ++i) {
     const std::uint32_t bits = halfs[i].bits;
     const float magnitude = std::bit_cast<float>((bits & 0x7fffU) << 13) * 0x1p112F;
-    values[i] = std::bit_cast<float>(std::bit_cast<std::uint32_t>(magnitude) | (bits & 0x8000U) << 16);
+    values[i] =
+        std::bit_cast<float>(std::bit_cast<std::uint32_t>(magnitude) | (bits & 0x8000U) << 16);
   }
 }
 
@@ -32,12 +33,12 @@ void check_flags(const TensorFile& file, const std::vector<std::uint8_t>& flags)
 }
 
 /// The middle extents of a tensor's shape, checked to lie in a sane range.
-std::uint64_t checked_extent(const TensorFile& file, const std::string& name, std::size_t rank, std::size_t axis,
-                             std::uint64_t min, std::uint64_t max) {
+std::uint64_t checked_extent(const TensorFile& file, const std::string& name, std::size_t rank,
+                             std::size_t axis, std::uint64_t min, std::uint64_t max) {
   const std::vector<std::uint64_t>& shape = file.shape(name);
   if (shape.size() != rank || shape[axis] < min || shape[axis] > max) {
-    throw FileError(fmt::format("{}: expected {} with {} axes, axis {} from {} to {} long", file.path().string(), name,
-                                rank, axis, min, max));
+    throw FileError(fmt::format("{}: expected {} with {} axes, axis {} from {} to {} long",
+                                file.path().string(), name, rank, axis, min, max));
   }
   return shape[axis];
 }
@@ -71,7 +72,8 @@ float SsdfVisibility::signed_distance(std::uint32_t segment, const Vec3& directi
     }
     if (c < 0) c += n;
     if (c >= n) c -= n;
-    cells[static_cast<std::size_t>(i)] = static_cast<std::size_t>(r) * static_cast<std::size_t>(n) + c;
+    cells[static_cast<std::size_t>(i)] =
+        static_cast<std::size_t>(r) * static_cast<std::size_t>(n) + c;
     shares[static_cast<std::size_t>(i)] =
         (i / 2 != 0 ? row_share : 1 - row_share) * (i % 2 != 0 ? column_share : 1 - column_share);
   }
@@ -82,9 +84,10 @@ float SsdfVisibility::signed_distance(std::uint32_t segment, const Vec3& directi
   for (std::size_t i = 0; i < 4; ++i) mean_distance += shares[i] * mean[cells[i]];
   using Components = Eigen::Map<const Eigen::ArrayXf>;
   auto at = [&](std::size_t i) { return Components(&basis[cells[i] * k], components); };
-  return mean_distance + (Components(stored.data(), components) *
-                          (shares[0] * at(0) + shares[1] * at(1) + shares[2] * at(2) + shares[3] * at(3)))
-                             .sum();
+  return mean_distance +
+         (Components(stored.data(), components) *
+          (shares[0] * at(0) + shares[1] * at(1) + shares[2] * at(2) + shares[3] * at(3)))
+             .sum();
 }
 
 void write_ssdf(const std::filesystem::path& path, const SsdfVisibility& ssdf,
@@ -114,7 +117,8 @@ SsdfVisibility read_ssdf(const std::filesystem::path& path) {
   ssdf.coefficients = file.get<Half>("coefficients", {0, k});
   ssdf.sees_nothing = file.get<std::uint8_t>("sees_nothing", {0});
   if (ssdf.sees_nothing.size() != segments) {
-    throw FileError(path.string() + ": coefficients and sees_nothing differ in their number of segments");
+    throw FileError(path.string() +
+                    ": coefficients and sees_nothing differ in their number of segments");
   }
   check_flags(file, ssdf.sees_nothing);
   return ssdf;
@@ -159,7 +163,8 @@ SgVisibility read_sg_visibility(const std::filesystem::path& path) {
   visibility.rotation = file.get<Half>("rotation", {0});
   visibility.sees_nothing = file.get<std::uint8_t>("sees_nothing", {0});
   if (visibility.rotation.size() != segments || visibility.sees_nothing.size() != segments) {
-    throw FileError(path.string() + ": weights, rotation and sees_nothing differ in their number of segments");
+    throw FileError(path.string() +
+                    ": weights, rotation and sees_nothing differ in their number of segments");
   }
   check_flags(file, visibility.sees_nothing);
   return visibility;

@@ -1,8 +1,8 @@
 #ifndef HEDDLE_FIBERS_BAKED_SEGMENT_VISIBILITY_H_
 #define HEDDLE_FIBERS_BAKED_SEGMENT_VISIBILITY_H_
-// Run-time form of segment visibility (Khungurn 2017, section 4.1): the spherical signed distance function compressed by
-// PCA, for sharp lights, and a sum of normalised spherical Gaussians, for soft lights. Fabric space.
-// Tested in tests/fibers/baked/segment_visibility_test.cpp.
+// Run-time form of segment visibility (Khungurn 2017, section 4.1): the spherical signed distance
+// function compressed by PCA, for sharp lights, and a sum of normalised spherical Gaussians, for
+// soft lights. Fabric space. Tested in tests/fibers/baked/segment_visibility_test.cpp.
 
 #include <cstdint>
 #include <filesystem>
@@ -15,25 +15,28 @@
 
 namespace heddle {
 
-/// Signed distances d(direction) in radians to the nearest edge of visibility, positive where the sky is visible.
+/// Signed distances d(direction) in radians to the nearest edge of visibility, positive where the
+/// sky is visible.
 struct SsdfVisibility {
-  int resolution = 128;            // lat-long map: row = polar angle from +z, column = azimuth atan2(y, x)
+  // lat-long map: row = polar angle from +z, column = azimuth atan2(y, x)
+  int resolution = 128;
   int components = 48;
-  std::vector<float> mean;         // [row][column]
-  std::vector<float> basis;        // [row][column][component]
-  std::vector<Half> coefficients;  // [segment][component]
+  std::vector<float> mean;                 // [row][column]
+  std::vector<float> basis;                // [row][column][component]
+  std::vector<Half> coefficients;          // [segment][component]
   std::vector<std::uint8_t> sees_nothing;  // [segment] 1 where no direction is open
 
   /// Signed distance of a segment in one direction; -pi for a segment that sees nothing.
   float signed_distance(std::uint32_t segment, const Vec3& direction) const;
 };
 
-/// V(direction) ~ sum over q of weight[q] * G(direction; R_z(rotation) axis[q], sharpness) / M(sharpness).
+/// V(direction) ~ sum over q of weight[q] * G(direction; R_z(rotation) axis[q], sharpness) /
+/// M(sharpness).
 struct SgVisibility {
   float sharpness = 128;
-  std::vector<Vec3> axes;          // [lobe] before the segment's rotation about z
-  std::vector<Half> weights;       // [segment][lobe] steradians
-  std::vector<Half> rotation;      // [segment] radians about +z
+  std::vector<Vec3> axes;                  // [lobe] before the segment's rotation about z
+  std::vector<Half> weights;               // [segment][lobe] steradians
+  std::vector<Half> rotation;              // [segment] radians about +z
   std::vector<std::uint8_t> sees_nothing;  // [segment]
 
   int lobes() const { return static_cast<int>(axes.size()); }

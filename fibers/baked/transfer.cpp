@@ -12,7 +12,8 @@ namespace {
 using RowMajorMatrix = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 /// The `index`-th of matrices of `rows` x `columns` stored one after the other.
-Eigen::Map<const RowMajorMatrix> matrix_at(const std::vector<float>& values, std::size_t index, int rows, int columns) {
+Eigen::Map<const RowMajorMatrix> matrix_at(const std::vector<float>& values, std::size_t index,
+                                           int rows, int columns) {
   return {values.data() + index * static_cast<std::size_t>(rows * columns), rows, columns};
 }
 
@@ -21,15 +22,18 @@ Eigen::Map<const RowMajorMatrix> matrix_at(const std::vector<float>& values, std
 void Transfer::incoming(std::uint32_t cell, const float* light, float* result) const {
   const int n = coefficients();
   Eigen::Map<const Eigen::RowVectorXf> c_light(light, n);
-  Eigen::Map<Eigen::RowVectorXf>(result, 3 * n).noalias() = c_light * matrix_at(matrices, cell, n, 3 * n);
+  Eigen::Map<Eigen::RowVectorXf>(result, 3 * n).noalias() =
+      c_light * matrix_at(matrices, cell, n, 3 * n);
 }
 
-void Transfer::incoming(std::uint32_t cell, const float* light, float cone_share, float* result) const {
+void Transfer::incoming(std::uint32_t cell, const float* light, float cone_share,
+                        float* result) const {
   incoming(cell, light, result);
   if (!cones || !(cone_share > 0)) return;
   const int n = coefficients();
   Eigen::Map<const Eigen::RowVectorXf> c_light(light, n);
-  Eigen::Map<Eigen::RowVectorXf>(result, 3 * n).noalias() -= cone_share * c_light * matrix_at(cones->harmonics, cell, n, 3 * n);
+  Eigen::Map<Eigen::RowVectorXf>(result, 3 * n).noalias() -=
+      cone_share * c_light * matrix_at(cones->harmonics, cell, n, 3 * n);
 }
 
 void Transfer::incoming_on_cones(std::uint32_t cell, const float* light, float* result) const {
@@ -37,21 +41,26 @@ void Transfer::incoming_on_cones(std::uint32_t cell, const float* light, float* 
   const int n = coefficients();
   Eigen::Map<const Eigen::RowVectorXf> c_light(light, n);
   for (int width = 0; width < ConeTransfer::kWidths; ++width) {
-    const std::size_t index = static_cast<std::size_t>(cell) * ConeTransfer::kWidths + static_cast<std::size_t>(width);
+    const std::size_t index =
+        static_cast<std::size_t>(cell) * ConeTransfer::kWidths + static_cast<std::size_t>(width);
     Eigen::Map<Eigen::RowVectorXf>(result + width * kRow, kRow).noalias() =
         c_light * matrix_at(cones->moments, index, n, kRow);
   }
 }
 
-void add_cones(TensorFileWriter& file, const ConeTransfer& cones, std::uint64_t cells, std::uint64_t n) {
+void add_cones(TensorFileWriter& file, const ConeTransfer& cones, std::uint64_t cells,
+               std::uint64_t n) {
   file.add<float>("cone_harmonics", {cells, n, n, 3}, cones.harmonics);
-  file.add<float>("cone_moments", {cells, ConeTransfer::kWidths, n, ConeTransfer::kAzimuths, 3}, cones.moments);
+  file.add<float>("cone_moments", {cells, ConeTransfer::kWidths, n, ConeTransfer::kAzimuths, 3},
+                  cones.moments);
 }
 
-std::optional<ConeTransfer> get_cones(const TensorFile& file, std::uint64_t cells, std::uint64_t n) {
+std::optional<ConeTransfer> get_cones(const TensorFile& file, std::uint64_t cells,
+                                      std::uint64_t n) {
   if (!file.entries().contains("cone_moments")) return {};
   return ConeTransfer{file.get<float>("cone_harmonics", {cells, n, n, 3}),
-                      file.get<float>("cone_moments", {cells, ConeTransfer::kWidths, n, ConeTransfer::kAzimuths, 3})};
+                      file.get<float>("cone_moments", {cells, ConeTransfer::kWidths, n,
+                                                       ConeTransfer::kAzimuths, 3})};
 }
 
 Transfer cut_to_order(const Transfer& transfer, int order) {
@@ -61,8 +70,8 @@ Transfer cut_to_order(const Transfer& transfer, int order) {
   const auto all = static_cast<std::size_t>(transfer.coefficients());
   const auto kept = static_cast<std::size_t>(result.coefficients());
   // The first kept_rows of every `rows` rows, and the first kept_columns of every row.
-  const auto cut = [](std::vector<float>& values, std::size_t rows, std::size_t columns, std::size_t kept_rows,
-                      std::size_t kept_columns) {
+  const auto cut = [](std::vector<float>& values, std::size_t rows, std::size_t columns,
+                      std::size_t kept_rows, std::size_t kept_columns) {
     std::vector<float> low;
     for (std::size_t row = 0; row < values.size() / columns; ++row) {
       if (row % rows >= kept_rows) continue;
@@ -102,13 +111,15 @@ Transfer read_transfer(const std::filesystem::path& path) {
   const TensorFile file = TensorFile::read(path);
   Transfer t;
   const std::string& sides = file.metadata_value("light_from");
-  if (sides != "face" && sides != "both") throw FileError(path.string() + ": light_from is neither face nor both");
+  if (sides != "face" && sides != "both")
+    throw FileError(path.string() + ": light_from is neither face nor both");
   t.both_sides = sides == "both";
   const std::uint64_t count = file.get<std::uint32_t>("paths", {0}).size();
   if (count == 0) throw FileError(path.string() + ": no cells");
   const std::vector<std::uint64_t>& error_shape = file.shape("standard_error");
   if (error_shape.size() != 3 || error_shape[1] < 1 || error_shape[1] > 11) {
-    throw FileError(path.string() + ": expected standard_error of shape [cell][band][3] with 1 to 11 bands");
+    throw FileError(path.string() +
+                    ": expected standard_error of shape [cell][band][3] with 1 to 11 bands");
   }
   t.order = static_cast<int>(error_shape[1]) - 1;
   const auto n = static_cast<std::uint64_t>(t.coefficients());
@@ -118,7 +129,8 @@ Transfer read_transfer(const std::filesystem::path& path) {
   t.cones = get_cones(file, count, n);
   t.cell_of_segment = file.get<std::uint32_t>("cell_of_segment", {0});
   for (const std::uint32_t cell : t.cell_of_segment) {
-    if (cell >= count) throw FileError(fmt::format("{}: cell {} of {}", path.string(), cell, count));
+    if (cell >= count)
+      throw FileError(fmt::format("{}: cell {} of {}", path.string(), cell, count));
   }
   return t;
 }

@@ -1,9 +1,9 @@
 #ifndef HEDDLE_FIBERS_BAKED_TRANSFER_H_
 #define HEDDLE_FIBERS_BAKED_TRANSFER_H_
-// Run-time form of the incoming indirect radiance transfer function (IIRTF): per cell a matrix of real spherical harmonics
-// coefficients, c_T[j1] = sum over j0 of a[j0][j1] * c_light[j0], j0 the light and j1 the incoming direction, fabric space
-// (Khungurn 2017, sections 4.2 and 5.3; index order corrected as in design section 3).
-// Tested in tests/fibers/baked/transfer_test.cpp.
+// Run-time form of the incoming indirect radiance transfer function (IIRTF): per cell a matrix of
+// real spherical harmonics coefficients, c_T[j1] = sum over j0 of a[j0][j1] * c_light[j0], j0 the
+// light and j1 the incoming direction, fabric space (Khungurn 2017, sections 4.2 and 5.3; index
+// order corrected as in design section 3). Tested in tests/fibers/baked/transfer_test.cpp.
 
 #include <cstdint>
 #include <filesystem>
@@ -22,9 +22,10 @@ class TensorFileWriter;
 
 struct Transfer {
   int order = 5;  // highest SH band; (order + 1)^2 coefficients
-  bool both_sides = false;            // light from the whole sphere; otherwise only from the face side (z > 0)
+  // light from the whole sphere; otherwise only from the face side (z > 0)
+  bool both_sides = false;
   std::vector<std::uint32_t> cell_of_segment;  // [segment]; every cell has a segment
-  std::vector<float> matrices;        // [cell][j0][j1][rgb]
+  std::vector<float> matrices;                 // [cell][j0][j1][rgb]
   std::vector<float> standard_error;  // [cell][band of j1][rgb]: rms over the entries of the band
   std::vector<std::uint32_t> paths;   // [cell] paths spent
   std::optional<ConeTransfer> cones;  // a finer model of some of the light that `matrices` hold
@@ -47,10 +48,13 @@ void write_transfer(const std::filesystem::path& path, const Transfer& transfer,
                     const std::map<std::string, std::string>& metadata);
 Transfer read_transfer(const std::filesystem::path& path);
 
-/// The cones' tensors of `cells` cells at `coefficients` harmonics, in a transfer's file or in a chunk of one.
-void add_cones(TensorFileWriter& file, const ConeTransfer& cones, std::uint64_t cells, std::uint64_t coefficients);
+/// The cones' tensors of `cells` cells at `coefficients` harmonics, in a transfer's file or in a
+/// chunk of one.
+void add_cones(TensorFileWriter& file, const ConeTransfer& cones, std::uint64_t cells,
+               std::uint64_t coefficients);
 /// Nothing where the file holds none.
-std::optional<ConeTransfer> get_cones(const TensorFile& file, std::uint64_t cells, std::uint64_t coefficients);
+std::optional<ConeTransfer> get_cones(const TensorFile& file, std::uint64_t cells,
+                                      std::uint64_t coefficients);
 
 }  // namespace heddle
 

@@ -13,7 +13,8 @@ namespace {
 constexpr float kBundleRadii = 4;
 constexpr float kLeastCosine = 0.9F;  // between tangents of one bundle
 
-// Columns along an axis. Those of any real fabric are fewer; more would be finer than a float tells places apart.
+// Columns along an axis. Those of any real fabric are fewer; more would be finer than a float tells
+// places apart.
 constexpr float kMostColumns = 4096;
 
 }  // namespace
@@ -29,7 +30,8 @@ std::vector<Vec3> bundle_tangents(const Exemplar& exemplar) {
     reach = std::max(reach, kBundleRadii * exemplar.radius_mm[exemplar.segment_fiber[s]]);
   }
 
-  // Columns over the period, at least `reach` wide, so that a segment's neighbours lie in its own column and those around it.
+  // Columns over the period, at least `reach` wide, so that a segment's neighbours lie in its own
+  // column and those around it.
   const auto columns = [reach](float period) {
     return std::max(1, static_cast<int>(std::min(period / reach, kMostColumns)));
   };
@@ -43,7 +45,8 @@ std::vector<Vec3> bundle_tangents(const Exemplar& exemplar) {
     return std::pair{column_of(midpoint[s].x(), exemplar.width_mm, nx),
                      column_of(midpoint[s].y(), exemplar.height_mm, ny)};
   };
-  // Most columns of sparse yarns are empty: the segments are sorted by their column, instead of a list for each column.
+  // Most columns of sparse yarns are empty: the segments are sorted by their column, instead of a
+  // list for each column.
   struct Member {
     int column;
     std::uint32_t segment;
@@ -55,7 +58,8 @@ std::vector<Vec3> bundle_tangents(const Exemplar& exemplar) {
     members.push_back({y * nx + x, s});
   }
   std::sort(members.begin(), members.end());
-  // With fewer than three columns around a period, a step to either side would meet the same column twice.
+  // With fewer than three columns around a period, a step to either side would meet the same column
+  // twice.
   const auto first_step = [](int count) { return count > 2 ? -1 : 0; };
   const auto last_step = [](int count) { return count > 1 ? 1 : 0; };
 
@@ -89,7 +93,8 @@ double bundle_spread(const Exemplar& exemplar, std::span<const Vec3> bundle_tang
   double sum = 0;
   for (std::uint32_t s = 0; s < bundle_tangent.size(); ++s) {
     const Vec3 tangent = exemplar.segment_tangent(s);
-    const double angle = std::atan2(tangent.cross(bundle_tangent[s]).norm(), tangent.dot(bundle_tangent[s]));
+    const double angle =
+        std::atan2(tangent.cross(bundle_tangent[s]).norm(), tangent.dot(bundle_tangent[s]));
     sum += angle * angle;
   }
   return std::sqrt(sum / static_cast<double>(std::max<std::size_t>(1, bundle_tangent.size())));

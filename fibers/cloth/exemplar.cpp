@@ -13,14 +13,15 @@ namespace heddle {
 namespace {
 
 [[noreturn]] void broken(const std::string& name, int invariant, const std::string& what) {
-  throw FileError(fmt::format("{}: invariant {} of the exemplar does not hold: {}", name, invariant, what));
+  throw FileError(
+      fmt::format("{}: invariant {} of the exemplar does not hold: {}", name, invariant, what));
 }
 
 // Invariant 1 alone: what index_segments() relies on.
 void validate_layout(const Exemplar& e, const std::string& name) {
   const std::size_t fibers = e.radius_mm.size();
-  if (fibers == 0 || e.first_point.size() != fibers + 1 || e.material.size() != fibers || e.first_point[0] != 0 ||
-      e.first_point.back() != e.points.size()) {
+  if (fibers == 0 || e.first_point.size() != fibers + 1 || e.material.size() != fibers ||
+      e.first_point[0] != 0 || e.first_point.back() != e.points.size()) {
     broken(name, 1, "the fibers do not cover the points exactly");
   }
   for (std::size_t f = 0; f < fibers; ++f) {
@@ -37,7 +38,9 @@ constexpr float kMinRadiusMm = 1e-6F;
 void validate_sizes(const Exemplar& e, const std::string& name) {
   const auto is_length = [](float length) { return length > 0 && length <= kMaxTileMm; };
   if (!is_length(e.width_mm) || !is_length(e.height_mm)) {
-    broken(name, 2, fmt::format("a tile of {} x {} mm is not between 0 and {} mm", e.width_mm, e.height_mm, kMaxTileMm));
+    broken(name, 2,
+           fmt::format("a tile of {} x {} mm is not between 0 and {} mm", e.width_mm, e.height_mm,
+                       kMaxTileMm));
   }
   for (std::size_t f = 0; f < e.fiber_count(); ++f) {
     const float r = e.radius_mm[f];
@@ -47,9 +50,13 @@ void validate_sizes(const Exemplar& e, const std::string& name) {
     for (std::uint32_t p = e.first_point[f]; p < e.first_point[f + 1]; ++p) {
       const Vec3& point = e.points[p];
       const auto is_near = [](float x, float period) { return x >= -period && x <= 2 * period; };
-      if (!is_near(point.x(), e.width_mm) || !is_near(point.y(), e.height_mm) || !(std::abs(point.z()) <= kMaxHeightMm)) {
-        broken(name, 2, fmt::format("point {} of fiber {} lies at ({}, {}, {}) mm, far from a tile of {} x {} mm",
-                                    p - e.first_point[f], f, point.x(), point.y(), point.z(), e.width_mm, e.height_mm));
+      if (!is_near(point.x(), e.width_mm) || !is_near(point.y(), e.height_mm) ||
+          !(std::abs(point.z()) <= kMaxHeightMm)) {
+        broken(
+            name, 2,
+            fmt::format(
+                "point {} of fiber {} lies at ({}, {}, {}) mm, far from a tile of {} x {} mm",
+                p - e.first_point[f], f, point.x(), point.y(), point.z(), e.width_mm, e.height_mm));
       }
     }
   }
@@ -63,14 +70,20 @@ void validate_scattering(const Exemplar& e, const std::string& name) {
   for (std::size_t m = 0; m < e.scattering.size(); ++m) {
     const FiberScattering& fiber = e.scattering[m];
     if (fiber.isotropic_white) continue;
-    const auto is_share = [](const Rgbd& color) { return (color >= 0).all() && (color <= 1).all(); };
-    const auto is_width = [](double width, double most_deg) { return width >= radians(0.01) && width <= radians(most_deg); };
+    const auto is_share = [](const Rgbd& color) {
+      return (color >= 0).all() && (color <= 1).all();
+    };
+    const auto is_width = [](double width, double most_deg) {
+      return width >= radians(0.01) && width <= radians(most_deg);
+    };
     if (!is_share(fiber.color_r) || !is_share(fiber.color_tt)) {
       broken(name, 6, fmt::format("a colour of material {} is outside [0, 1]", m));
     }
-    if (!is_width(fiber.beta_r, 90) || !is_width(fiber.beta_tt, 90) || !is_width(fiber.gamma_tt, 360)) {
-      broken(name, 6, fmt::format("material {} has lobes of {}, {} and {} radians", m, fiber.beta_r, fiber.beta_tt,
-                                  fiber.gamma_tt));
+    if (!is_width(fiber.beta_r, 90) || !is_width(fiber.beta_tt, 90) ||
+        !is_width(fiber.gamma_tt, 360)) {
+      broken(name, 6,
+             fmt::format("material {} has lobes of {}, {} and {} radians", m, fiber.beta_r,
+                         fiber.beta_tt, fiber.gamma_tt));
     }
   }
 }
@@ -106,7 +119,8 @@ void validate_exemplar(const Exemplar& e, const std::string& name) {
     const float r = e.radius_mm[f];
     const Vec3 period = e.points[e.first_point[f + 1] - 1] - e.points[e.first_point[f]];
     const float tolerance = 1e-5F * std::max(e.width_mm, e.height_mm);
-    if ((period - Vec3(e.width_mm, 0, 0)).norm() > tolerance && (period - Vec3(0, e.height_mm, 0)).norm() > tolerance) {
+    if ((period - Vec3(e.width_mm, 0, 0)).norm() > tolerance &&
+        (period - Vec3(0, e.height_mm, 0)).norm() > tolerance) {
       broken(name, 3, fmt::format("fiber {} does not continue in the next tile", f));
     }
     for (std::uint32_t p = e.first_point[f]; p + 1 < e.first_point[f + 1]; ++p) {
@@ -115,7 +129,8 @@ void validate_exemplar(const Exemplar& e, const std::string& name) {
       }
     }
     if (e.material[f] >= e.scattering.size()) {
-      broken(name, 5, fmt::format("fiber {} has material {} of {}", f, e.material[f], e.scattering.size()));
+      broken(name, 5,
+             fmt::format("fiber {} has material {} of {}", f, e.material[f], e.scattering.size()));
     }
   }
 }
@@ -132,7 +147,8 @@ void write_exemplar(const std::filesystem::path& path, const Exemplar& e,
     for (const Rgbd* color : {&s.color_r, &s.color_tt}) {
       scattering.insert(scattering.end(), {color->x(), color->y(), color->z()});
     }
-    scattering.insert(scattering.end(), {s.beta_r, s.beta_tt, s.gamma_tt, s.isotropic_white ? 1.0 : 0.0});
+    scattering.insert(scattering.end(),
+                      {s.beta_r, s.beta_tt, s.gamma_tt, s.isotropic_white ? 1.0 : 0.0});
   }
   const float tile[2] = {e.width_mm, e.height_mm};
   file.add<float>("tile_mm", {2}, tile);
@@ -161,7 +177,8 @@ Exemplar read_exemplar(const std::filesystem::path& path) {
   const auto scattering = file.get<double>("scattering", {0, kScatteringNumbers});
   for (std::size_t i = 0; i < scattering.size(); i += kScatteringNumbers) {
     const double* v = scattering.data() + i;
-    e.scattering.push_back({Rgbd(v[0], v[1], v[2]), Rgbd(v[3], v[4], v[5]), v[6], v[7], v[8], v[9] != 0});
+    e.scattering.push_back(
+        {Rgbd(v[0], v[1], v[2]), Rgbd(v[3], v[4], v[5]), v[6], v[7], v[8], v[9] != 0});
   }
   validate_exemplar(e, path.string());
   index_segments(e);

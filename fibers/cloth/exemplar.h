@@ -1,12 +1,14 @@
 #ifndef HEDDLE_FIBERS_CLOTH_EXEMPLAR_H_
 #define HEDDLE_FIBERS_CLOTH_EXEMPLAR_H_
-// The exemplar: explicit fibers of one fabric tile, periodic in x (weft direction) and y (warp direction), millimetres,
-// z = 0 the middle plane, +z out of the face. A fiber is a polyline of straight round segments whose last point is its
-// first point shifted by one period along its yarn, so that the curve goes on through every copy of the tile under one id.
-// Invariants, checked by validate_exemplar():
-//   1. first_point is ascending, starts at 0, ends at points.size(), and every fiber has at least 2 segments;
-//   2. the tile is at most 10 m wide and high; points lie within one tile around it and 1 m of its plane; radii are at least
-//      1 nm and below half the tile;
+// The exemplar: explicit fibers of one fabric tile, periodic in x (weft direction) and y (warp
+// direction), millimetres, z = 0 the middle plane, +z out of the face. A fiber is a polyline of
+// straight round segments whose last point is its first point shifted by one period along its yarn,
+// so that the curve goes on through every copy of the tile under one id. Invariants, checked by
+// validate_exemplar():
+//   1. first_point is ascending, starts at 0, ends at points.size(), and every fiber has at least 2
+//      segments;
+//   2. the tile is at most 10 m wide and high; points lie within one tile around it and 1 m of its
+//      plane; radii are at least 1 nm and below half the tile;
 //   3. the last point of a fiber is its first point shifted by (width, 0, 0) or (0, height, 0);
 //   4. no segment is shorter than a thousandth of its radius;
 //   5. materials are below material_count, and those are at most 64;
@@ -34,16 +36,17 @@ inline constexpr std::size_t kMaxMaterials = 64;
 struct Exemplar {
   float width_mm = 0;   // period along x
   float height_mm = 0;  // period along y
-  std::vector<std::uint32_t> first_point;  // [fiber + 1]  fiber f owns points first_point[f] .. first_point[f + 1] - 1
-  std::vector<Vec3> points;                // [point] millimetres
-  std::vector<float> radius_mm;            // [fiber]
-  std::vector<std::uint16_t> material;     // [fiber] index into `scattering`
+  // [fiber + 1]  fiber f owns points first_point[f] .. first_point[f + 1] - 1
+  std::vector<std::uint32_t> first_point;
+  std::vector<Vec3> points;                 // [point] millimetres
+  std::vector<float> radius_mm;             // [fiber]
+  std::vector<std::uint16_t> material;      // [fiber] index into `scattering`
   std::vector<FiberScattering> scattering;  // [material]
 
   // Derived by index_segments(): segment s runs from points[segment_point[s]] to the next point.
   std::vector<std::uint32_t> segment_point;  // [segment]
   std::vector<std::uint32_t> segment_fiber;  // [segment]
-  float z_min = 0;  // lowest and highest point of any fiber surface
+  float z_min = 0;                           // lowest and highest point of any fiber surface
   float z_max = 0;
 
   std::size_t fiber_count() const { return radius_mm.size(); }
@@ -61,7 +64,8 @@ struct Exemplar {
 /// Fills the derived arrays from the others.
 void index_segments(Exemplar& exemplar);
 
-/// Throws FileError with the number of the first broken invariant. `name` is the file named in the message.
+/// Throws FileError with the number of the first broken invariant. `name` is the file named in the
+/// message.
 void validate_exemplar(const Exemplar& exemplar, const std::string& name);
 
 /// The fibers artifact (tensor file); layout in fibers/README.md.

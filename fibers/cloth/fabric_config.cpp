@@ -14,7 +14,8 @@ constexpr double kMmPerUm = 1e-3;
 
 void check_tile(const TomlTable& weave, std::string_view key, double size_mm) {
   if (size_mm <= kMaxTileMm) return;
-  weave.fail(key, fmt::format("expected a tile of at most {} mm, found {:g} mm: yarns of a repeat x repeats x spacing_mm",
+  weave.fail(key, fmt::format("expected a tile of at most {} mm, found {:g} mm: yarns of a repeat "
+                              "x repeats x spacing_mm",
                               kMaxTileMm, size_mm));
 }
 
@@ -27,7 +28,8 @@ FiberType read_fiber(const TomlTable& table, const std::string& name) {
   FiberType fiber;
   fiber.name = name;
   fiber.radius_mm = kMmPerUm * table.number("radius_um", {.min = 0.1, .max = 1000});
-  if (table.choice("scattering", {"khungurn", "white-isotropic"}, "khungurn") == "white-isotropic") {
+  if (table.choice("scattering", {"khungurn", "white-isotropic"}, "khungurn") ==
+      "white-isotropic") {
     fiber.scattering.isotropic_white = true;
     return fiber;
   }
@@ -43,11 +45,13 @@ FiberType read_fiber(const TomlTable& table, const std::string& name) {
 YarnConfig read_yarn(const TomlTable& table, const FabricConfig& config) {
   YarnConfig yarn;
   const std::string fiber = table.string("fiber");
-  const auto found = std::find_if(config.fibers.begin(), config.fibers.end(),
-                                  [&](const FiberType& candidate) { return candidate.name == fiber; });
+  const auto found =
+      std::find_if(config.fibers.begin(), config.fibers.end(),
+                   [&](const FiberType& candidate) { return candidate.name == fiber; });
   if (found == config.fibers.end()) {
     std::string known;
-    for (const FiberType& candidate : config.fibers) known += (known.empty() ? "" : ", ") + candidate.name;
+    for (const FiberType& candidate : config.fibers)
+      known += (known.empty() ? "" : ", ") + candidate.name;
     table.fail("fiber", "expected the name of a [fiber.NAME] table: " + known);
   }
   yarn.fiber = static_cast<int>(found - config.fibers.begin());
@@ -55,9 +59,12 @@ YarnConfig read_yarn(const TomlTable& table, const FabricConfig& config) {
   yarn.spacing_mm = table.number("spacing_mm", {.min = 1e-3, .max = 100});
   yarn.width_mm = table.number("width_mm", {.min = 1e-3, .max = 100});
   yarn.height_mm = table.number("height_mm", {.min = 1e-3, .max = 100});
-  if (yarn.width_mm > yarn.spacing_mm) table.fail("width_mm", "expected at most spacing_mm: neighbouring yarns overlap");
-  if (yarn.width_mm <= 2 * radius) table.fail("width_mm", "expected more than the thickness of one fiber");
-  if (yarn.height_mm <= 2 * radius) table.fail("height_mm", "expected more than the thickness of one fiber");
+  if (yarn.width_mm > yarn.spacing_mm)
+    table.fail("width_mm", "expected at most spacing_mm: neighbouring yarns overlap");
+  if (yarn.width_mm <= 2 * radius)
+    table.fail("width_mm", "expected more than the thickness of one fiber");
+  if (yarn.height_mm <= 2 * radius)
+    table.fail("height_mm", "expected more than the thickness of one fiber");
   yarn.plies = static_cast<int>(table.integer("plies", 1, 12));
   yarn.fibers_per_ply = static_cast<int>(table.integer("fibers_per_ply", 1, 2000));
   const NumberRange twist{.min = -5000, .max = 5000};
@@ -93,7 +100,8 @@ FabricConfig read_fabric_config(const TomlTable& document) {
   config.crimp_warp = weave.number("crimp_warp", {.min = 0, .max = 1});
 
   const TomlTable fibers = document.table("fiber");
-  for (const std::string& name : fibers.table_names()) config.fibers.push_back(read_fiber(fibers.table(name), name));
+  for (const std::string& name : fibers.table_names())
+    config.fibers.push_back(read_fiber(fibers.table(name), name));
   if (config.fibers.empty() || config.fibers.size() > kMaxMaterials) {
     document.fail("fiber", fmt::format("expected 1 to {} tables [fiber.NAME]", kMaxMaterials));
   }

@@ -12,8 +12,9 @@ namespace {
 
 constexpr double kTurn = 2 * kPi;
 
-// Wander is a sum of this many Fourier modes per axis, with wavelengths between kShortestWave and kLongestWave fiber
-// radii: long against the fiber's thickness, short enough that even 10 degrees stay within the yarn.
+// Wander is a sum of this many Fourier modes per axis, with wavelengths between kShortestWave and
+// kLongestWave fiber radii: long against the fiber's thickness, short enough that even 10 degrees
+// stay within the yarn.
 constexpr int kWanderModes = 4;
 constexpr double kShortestWave = 25;
 constexpr double kLongestWave = 80;
@@ -24,8 +25,8 @@ constexpr double kPlaceJitter = 0.25;
 // Points per turn of the tightest helix that a polyline needs to look round.
 constexpr double kPointsPerTurn = 14;
 
-// Ply cross-sections: circles that touch each other and the yarn's edge; two plies are stretched across the line of
-// their centres as far as the yarn's disc allows (semi-axis sqrt(1/2)).
+// Ply cross-sections: circles that touch each other and the yarn's edge; two plies are stretched
+// across the line of their centres as far as the yarn's disc allows (semi-axis sqrt(1/2)).
 struct PlyShape {
   double centre;      // distance of the ply's axis from the yarn's axis
   double radial;      // semi-axis towards the yarn's axis
@@ -46,12 +47,13 @@ struct WanderMode {
 };
 
 // Modes whose slope has the given rms (mm per mm) over the period.
-std::array<WanderMode, kWanderModes> wander_modes(double slope_rms, double period_mm, double radius_mm,
-                                                  RandomStream& random) {
+std::array<WanderMode, kWanderModes> wander_modes(double slope_rms, double period_mm,
+                                                  double radius_mm, RandomStream& random) {
   std::array<WanderMode, kWanderModes> modes{};
   const double most = std::max(1.0, period_mm / (kShortestWave * radius_mm));
   const double least = std::min(most, std::max(1.0, period_mm / (kLongestWave * radius_mm)));
-  // Each mode carries an equal share of the squared slope: (amplitude * 2 pi waves / period)^2 / 2 = rms^2 / modes.
+  // Each mode carries an equal share of the squared slope: (amplitude * 2 pi waves / period)^2 / 2
+  // = rms^2 / modes.
   for (WanderMode& mode : modes) {
     mode.waves = std::round(least + (most - least) * random.uniform_double());
     mode.amplitude = slope_rms * std::sqrt(2.0 / kWanderModes) * period_mm / (kTurn * mode.waves);
@@ -77,12 +79,14 @@ SnappedTwist snap_twist(const YarnConfig& yarn, double period_mm) {
 
 double segments_per_fiber(const YarnConfig& yarn, double period_mm, double segment_mm) {
   const SnappedTwist twist = snap_twist(yarn, period_mm);
-  const int turns = std::max(std::abs(twist.yarn_turns + twist.ply_turns), std::abs(twist.yarn_turns));
+  const int turns =
+      std::max(std::abs(twist.yarn_turns + twist.ply_turns), std::abs(twist.yarn_turns));
   return std::max({4.0, std::ceil(period_mm / segment_mm), std::ceil(kPointsPerTurn * turns)});
 }
 
-void add_fibers_of_yarn(const YarnConfig& yarn, double fiber_radius_mm, const YarnPath& path, double segment_mm,
-                        std::uint64_t seed, std::uint32_t yarn_index, Exemplar& exemplar) {
+void add_fibers_of_yarn(const YarnConfig& yarn, double fiber_radius_mm, const YarnPath& path,
+                        double segment_mm, std::uint64_t seed, std::uint32_t yarn_index,
+                        Exemplar& exemplar) {
   const double period = path.length_mm();
   const SnappedTwist twist = snap_twist(yarn, period);
   const PlyShape shape = ply_shape(yarn.plies);
@@ -113,7 +117,8 @@ void add_fibers_of_yarn(const YarnConfig& yarn, double fiber_radius_mm, const Ya
         u0 /= norm;
         v0 /= norm;
       }
-      // Radial migration: R(s) = R (1 - m (1 + cos(waves s + phase)) / 2), once per turn of the ply and at least once.
+      // Radial migration: R(s) = R (1 - m (1 + cos(waves s + phase)) / 2), once per turn of the ply
+      // and at least once.
       const double migration_waves = std::max(1, std::abs(twist.ply_turns));
       const double migration_phase = kTurn * random.uniform_double();
       const auto wander_u = wander_modes(slope_rms, period, fiber_radius_mm, random);
@@ -122,7 +127,8 @@ void add_fibers_of_yarn(const YarnConfig& yarn, double fiber_radius_mm, const Ya
       for (int k = 0; k <= segments; ++k) {
         const double share = static_cast<double>(k % segments) / segments;
         const double squeeze =
-            1 - 0.5 * yarn.migration * (1 + std::cos(kTurn * migration_waves * share + migration_phase));
+            1 - 0.5 * yarn.migration *
+                    (1 + std::cos(kTurn * migration_waves * share + migration_phase));
         const double ply_turn = kTurn * twist.ply_turns * share;
         const double u = squeeze * (u0 * std::cos(ply_turn) - v0 * std::sin(ply_turn));
         const double v = squeeze * (u0 * std::sin(ply_turn) + v0 * std::cos(ply_turn));
@@ -130,8 +136,10 @@ void add_fibers_of_yarn(const YarnConfig& yarn, double fiber_radius_mm, const Ya
         const double a = ply_phase + kTurn * twist.yarn_turns * share;
         const double radial = shape.centre + shape.radial * u;
         const double tangential = shape.tangential * v;
-        double x = half_width * (radial * std::cos(a) - tangential * std::sin(a)) + wander_at(wander_u, share);
-        double y = half_height * (radial * std::sin(a) + tangential * std::cos(a)) + wander_at(wander_v, share);
+        double x = half_width * (radial * std::cos(a) - tangential * std::sin(a)) +
+                   wander_at(wander_u, share);
+        double y = half_height * (radial * std::sin(a) + tangential * std::cos(a)) +
+                   wander_at(wander_v, share);
         const double outside = std::hypot(x / half_width, y / half_height);
         if (outside > 1) {
           x /= outside;
@@ -139,8 +147,9 @@ void add_fibers_of_yarn(const YarnConfig& yarn, double fiber_radius_mm, const Ya
         }
         const double along = period * k / segments;
         const double height = path.height_at(period * share) + y;
-        exemplar.points.push_back(path.is_warp ? Vec3d(path.across_mm + x, along, height).cast<float>()
-                                               : Vec3d(along, path.across_mm + x, height).cast<float>());
+        exemplar.points.push_back(path.is_warp
+                                      ? Vec3d(path.across_mm + x, along, height).cast<float>()
+                                      : Vec3d(along, path.across_mm + x, height).cast<float>());
       }
       exemplar.first_point.push_back(static_cast<std::uint32_t>(exemplar.points.size()));
       exemplar.radius_mm.push_back(static_cast<float>(fiber_radius_mm));

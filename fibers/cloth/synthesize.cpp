@@ -24,7 +24,8 @@ ExemplarForecast forecast_exemplar(const FabricConfig& config) {
   const double ends = static_cast<double>(config.weave.ends) * config.repeats_x;
   const double picks = static_cast<double>(config.weave.picks) * config.repeats_y;
   const auto segments_of = [&](const YarnConfig& yarn, double yarns, double period_mm) {
-    return yarns * yarn.plies * yarn.fibers_per_ply * segments_per_fiber(yarn, period_mm, config.segment_mm);
+    return yarns * yarn.plies * yarn.fibers_per_ply *
+           segments_per_fiber(yarn, period_mm, config.segment_mm);
   };
   const double segments = segments_of(config.warp, ends, picks * config.weft.spacing_mm) +
                           segments_of(config.weft, picks, ends * config.warp.spacing_mm);
@@ -34,24 +35,27 @@ ExemplarForecast forecast_exemplar(const FabricConfig& config) {
 Exemplar synthesize(const FabricConfig& config, const std::function<void()>& yarn_done) {
   const ExemplarForecast forecast = forecast_exemplar(config);
   if (forecast.segments > kMostSegments) {
-    throw std::invalid_argument(fmt::format(
-        "the tile would have {:.3g} segments, at most {:.3g} are possible: make segment_um larger, repeats or "
-        "fibers_per_ply smaller",
-        forecast.segments, kMostSegments));
+    throw std::invalid_argument(
+        fmt::format("the tile would have {:.3g} segments, at most {:.3g} are possible: make "
+                    "segment_um larger, repeats or "
+                    "fibers_per_ply smaller",
+                    forecast.segments, kMostSegments));
   }
-  require_memory(static_cast<std::uint64_t>(forecast.bytes), fmt::format("fibers of {:.3g} segments", forecast.segments));
+  require_memory(static_cast<std::uint64_t>(forecast.bytes),
+                 fmt::format("fibers of {:.3g} segments", forecast.segments));
   const YarnPaths paths = lay_yarns(config);
   Exemplar exemplar;
   exemplar.width_mm = static_cast<float>(paths.width_mm);
   exemplar.height_mm = static_cast<float>(paths.height_mm);
   for (const FiberType& fiber : config.fibers) exemplar.scattering.push_back(fiber.scattering);
   exemplar.first_point.push_back(0);
-  exemplar.points.reserve(static_cast<std::size_t>(1.25 * forecast.segments));  // fibers have a point more than segments
+  // fibers have a point more than segments
+  exemplar.points.reserve(static_cast<std::size_t>(1.25 * forecast.segments));
   std::uint32_t yarn_index = 0;
   auto add_system = [&](const YarnConfig& yarn, const std::vector<YarnPath>& system) {
     for (const YarnPath& path : system) {
-      add_fibers_of_yarn(yarn, config.fibers[static_cast<std::size_t>(yarn.fiber)].radius_mm, path, config.segment_mm,
-                         config.seed, yarn_index++, exemplar);
+      add_fibers_of_yarn(yarn, config.fibers[static_cast<std::size_t>(yarn.fiber)].radius_mm, path,
+                         config.segment_mm, config.seed, yarn_index++, exemplar);
       yarn_done();
     }
   };
@@ -83,8 +87,10 @@ ExemplarSummary summarize(const Exemplar& exemplar) {
     const Vec3d d = (exemplar.points[p + 1] - exemplar.points[p]).cast<double>();
     const double l = d.norm();
     const double r = exemplar.radius_mm[f];
-    const Vec3 period = exemplar.points[exemplar.first_point[f + 1] - 1] - exemplar.points[exemplar.first_point[f]];
-    const double in_plane = period.x() > period.y() ? std::atan2(d.y(), d.x()) : std::atan2(d.x(), d.y());
+    const Vec3 period =
+        exemplar.points[exemplar.first_point[f + 1] - 1] - exemplar.points[exemplar.first_point[f]];
+    const double in_plane =
+        period.x() > period.y() ? std::atan2(d.y(), d.x()) : std::atan2(d.x(), d.y());
     length += l;
     volume += l * kPi * r * r;
     squared_angle += l * in_plane * in_plane;

@@ -25,7 +25,7 @@ Weave parse_weave(std::string_view notation, WeaveFace face) {
   weave.notation = std::string(notation);
   int a = 0;
   int b = 0;
-  int ups = 0;           // warp-up crossings per pick, at the start of the pattern
+  int ups = 0;  // warp-up crossings per pick, at the start of the pattern
   if (notation == "plain") {
     a = b = ups = 1;
     weave.ends = 2;
@@ -35,7 +35,8 @@ Weave parse_weave(std::string_view notation, WeaveFace face) {
   } else if (notation.starts_with("satin ") && parse_pair(notation.substr(6), a, b)) {
     if (a < 5 || b < 2 || b > a - 2 || std::gcd(a, b) != 1) {
       throw std::invalid_argument(
-          "a satin of n ends with step s needs n >= 5, 2 <= s <= n - 2, n and s without common divisor, such as "
+          "a satin of n ends with step s needs n >= 5, 2 <= s <= n - 2, n and s without common "
+          "divisor, such as "
           "\"satin 5/2\" or \"satin 8/3\"");
     }
     weave.ends = a;

@@ -15,11 +15,11 @@ enum class WeaveFace : std::uint8_t { kWarp, kWeft };
 
 struct Weave {
   std::string notation;
-  int ends = 0;                        // columns of the repeat
-  int picks = 0;                       // rows of the repeat
-  int step = 1;                        // shift of the pattern from one pick to the next, in ends
-  WeaveFace face = WeaveFace::kWarp;   // which system floats on the face
-  std::vector<std::uint8_t> warp_up;   // [pick][end] 1 where the warp lies over the weft
+  int ends = 0;                       // columns of the repeat
+  int picks = 0;                      // rows of the repeat
+  int step = 1;                       // shift of the pattern from one pick to the next, in ends
+  WeaveFace face = WeaveFace::kWarp;  // which system floats on the face
+  std::vector<std::uint8_t> warp_up;  // [pick][end] 1 where the warp lies over the weft
 
   /// Is the warp over the weft where end and pick cross? Indices wrap.
   bool is_warp_up(int end, int pick) const {
@@ -29,8 +29,9 @@ struct Weave {
   }
 };
 
-/// Parses a notation. twill n/m: n up, m down, step 1. satin n/step: warp-faced (one weft float of n - 1 hidden) or
-/// weft-faced; n >= 5, 2 <= step <= n - 2, n and step coprime. Throws std::invalid_argument saying what was expected.
+/// Parses a notation. twill n/m: n up, m down, step 1. satin n/step: warp-faced (one weft float of
+/// n - 1 hidden) or weft-faced; n >= 5, 2 <= step <= n - 2, n and step coprime. Throws
+/// std::invalid_argument saying what was expected.
 Weave parse_weave(std::string_view notation, WeaveFace face);
 
 }  // namespace heddle

@@ -9,9 +9,11 @@
 namespace heddle {
 namespace {
 
-// Points per crossing and axis on which the crest height is found; smallest_clearance() on a finer grid judges it.
+// Points per crossing and axis on which the crest height is found; smallest_clearance() on a finer
+// grid judges it.
 constexpr int kSolveSamples = 65;
-// What the grid can miss of the tightest place between its points (measured: 2e-4 of the touching height).
+// What the grid can miss of the tightest place between its points (measured: 2e-4 of the touching
+// height).
 constexpr double kGridAllowance = 1.001;
 // Crests taller than this many times the touching height mean that the yarns leave no room to pass.
 constexpr double kLargestCrestFactor = 3;
@@ -22,10 +24,12 @@ double section(double distance, double half_width) {
   return std::sqrt(std::max(0.0, 1 - u * u));
 }
 
-// What decides the heights at a crossing: which yarn lies over there and at the four crossings beside it, as yarns are at most
-// as wide as their spacing.
+// What decides the heights at a crossing: which yarn lies over there and at the four crossings
+// beside it, as yarns are at most as wide as their spacing.
 unsigned kind_of_crossing(const Weave& weave, int end, int pick) {
-  const auto bit = [&](int e, int p, unsigned value) { return weave.is_warp_up(e, p) ? value : 0U; };
+  const auto bit = [&](int e, int p, unsigned value) {
+    return weave.is_warp_up(e, p) ? value : 0U;
+  };
   return bit(end, pick, 1) | bit(end - 1, pick, 2) | bit(end + 1, pick, 4) | bit(end, pick - 1, 8) |
          bit(end, pick + 1, 16);
 }
@@ -37,10 +41,11 @@ struct CrossingPoint {
   double needed;  // by the two sections
 };
 
-// Calls f(CrossingPoint) on a grid over one crossing of each kind, all in vertical mm. There are at most 2^5 kinds, and all
-// crossings of the tile are copies of these.
+// Calls f(CrossingPoint) on a grid over one crossing of each kind, all in vertical mm. There are at
+// most 2^5 kinds, and all crossings of the tile are copies of these.
 template <class F>
-void for_each_crossing_point(const FabricConfig& config, const YarnPaths& paths, int samples, F&& f) {
+void for_each_crossing_point(const FabricConfig& config, const YarnPaths& paths, int samples,
+                             F&& f) {
   const double a_warp = 0.5 * config.warp.width_mm;
   const double a_weft = 0.5 * config.weft.width_mm;
   const auto over_crossing = [&](int end, int pick, unsigned kind) {
@@ -52,8 +57,10 @@ void for_each_crossing_point(const FabricConfig& config, const YarnPaths& paths,
       for (int ix = 0; ix < samples; ++ix) {
         const double dx = a_warp * (2.0 * ix / (samples - 1) - 1);
         f(CrossingPoint{
-            kind, dx, dy, sign * (warp.height_at(weft.across_mm + dy) - weft.height_at(warp.across_mm + dx)),
-            0.5 * (config.warp.height_mm * section(dx, a_warp) + config.weft.height_mm * section(dy, a_weft))});
+            kind, dx, dy,
+            sign * (warp.height_at(weft.across_mm + dy) - weft.height_at(warp.across_mm + dx)),
+            0.5 * (config.warp.height_mm * section(dx, a_warp) +
+                   config.weft.height_mm * section(dy, a_weft))});
       }
     }
   };
@@ -66,8 +73,8 @@ void for_each_crossing_point(const FabricConfig& config, const YarnPaths& paths,
   }
 }
 
-// Smallest gap, to the last bit, at this place of a crossing among all its copies in the tile. Rounding is monotonic, so the
-// copies along x and along y need not be paired.
+// Smallest gap, to the last bit, at this place of a crossing among all its copies in the tile.
+// Rounding is monotonic, so the copies along x and along y need not be paired.
 double smallest_gap_of_copies(const FabricConfig& config, const YarnPaths& paths, int end, int pick,
                               const CrossingPoint& point) {
   const double sign = config.weave.is_warp_up(end, pick) ? 1 : -1;
@@ -76,18 +83,19 @@ double smallest_gap_of_copies(const FabricConfig& config, const YarnPaths& paths
   double upper = std::numeric_limits<double>::infinity();
   double lower = -upper;
   for (std::size_t p = static_cast<std::size_t>(pick); p < paths.weft.size(); p += step_y) {
-    upper =
-        std::min(upper, sign * paths.warp[static_cast<std::size_t>(end)].height_at(paths.weft[p].across_mm + point.dy));
+    upper = std::min(upper, sign * paths.warp[static_cast<std::size_t>(end)].height_at(
+                                       paths.weft[p].across_mm + point.dy));
   }
   for (std::size_t e = static_cast<std::size_t>(end); e < paths.warp.size(); e += step_x) {
-    lower = std::max(lower,
-                     sign * paths.weft[static_cast<std::size_t>(pick)].height_at(paths.warp[e].across_mm + point.dx));
+    lower = std::max(lower, sign * paths.weft[static_cast<std::size_t>(pick)].height_at(
+                                       paths.warp[e].across_mm + point.dx));
   }
   return upper - lower;
 }
 
-// By how much crests must be taller than `paths` has them. Heights scale with the crests, so each point asks for a smallest
-// factor: needed gap / gap at factor 1. Copies of a crossing ask for the same but for their last bits; the largest counts.
+// By how much crests must be taller than `paths` has them. Heights scale with the crests, so each
+// point asks for a smallest factor: needed gap / gap at factor 1. Copies of a crossing ask for the
+// same but for their last bits; the largest counts.
 double crest_factor(const FabricConfig& config, const YarnPaths& paths) {
   constexpr double kLeastNeed = 1e-9;         // mm
   constexpr double kMoreThanRounding = 1e-9;  // relative
@@ -107,7 +115,8 @@ double crest_factor(const FabricConfig& config, const YarnPaths& paths) {
       const unsigned kind = kind_of_crossing(config.weave, end, pick);
       for (const CrossingPoint& point : points) {
         if (point.kind != kind) continue;
-        factor = std::max(factor, point.needed / smallest_gap_of_copies(config, paths, end, pick, point));
+        factor = std::max(factor,
+                          point.needed / smallest_gap_of_copies(config, paths, end, pick, point));
       }
     }
   }
@@ -136,14 +145,16 @@ YarnPaths lay_yarns(const FabricConfig& config) {
   for (int end = 0; end < ends; ++end) {
     YarnPath yarn{true, (end + 0.5) * config.warp.spacing_mm, config.weft.spacing_mm, picks, {}};
     for (int pick = 0; pick < config.weave.picks; ++pick) {
-      yarn.crest_mm.push_back((config.weave.is_warp_up(end, pick) ? 1 : -1) * config.crimp_warp * touching);
+      yarn.crest_mm.push_back((config.weave.is_warp_up(end, pick) ? 1 : -1) * config.crimp_warp *
+                              touching);
     }
     paths.warp.push_back(std::move(yarn));
   }
   for (int pick = 0; pick < picks; ++pick) {
     YarnPath yarn{false, (pick + 0.5) * config.weft.spacing_mm, config.warp.spacing_mm, ends, {}};
     for (int end = 0; end < config.weave.ends; ++end) {
-      yarn.crest_mm.push_back((config.weave.is_warp_up(end, pick) ? -1 : 1) * (1 - config.crimp_warp) * touching);
+      yarn.crest_mm.push_back((config.weave.is_warp_up(end, pick) ? -1 : 1) *
+                              (1 - config.crimp_warp) * touching);
     }
     paths.weft.push_back(std::move(yarn));
   }
@@ -151,7 +162,8 @@ YarnPaths lay_yarns(const FabricConfig& config) {
   double factor = crest_factor(config, paths);
   if (factor > kLargestCrestFactor) {
     throw std::invalid_argument(
-        "warp and weft cannot pass each other without overlapping: make width_mm smaller against spacing_mm");
+        "warp and weft cannot pass each other without overlapping: make width_mm smaller against "
+        "spacing_mm");
   }
   factor *= kGridAllowance;
   for (auto* system : {&paths.warp, &paths.weft}) {
@@ -164,8 +176,9 @@ YarnPaths lay_yarns(const FabricConfig& config) {
 
 double smallest_clearance(const FabricConfig& config, const YarnPaths& paths, int samples) {
   double smallest = std::numeric_limits<double>::infinity();
-  for_each_crossing_point(config, paths, samples,
-                          [&](const CrossingPoint& point) { smallest = std::min(smallest, point.gap - point.needed); });
+  for_each_crossing_point(config, paths, samples, [&](const CrossingPoint& point) {
+    smallest = std::min(smallest, point.gap - point.needed);
+  });
   return smallest;
 }
 

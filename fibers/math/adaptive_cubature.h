@@ -1,11 +1,12 @@
 #ifndef HEDDLE_FIBERS_MATH_ADAPTIVE_CUBATURE_H_
 #define HEDDLE_FIBERS_MATH_ADAPTIVE_CUBATURE_H_
-// Integrals over a rectangle of functions that are smooth but for a few lines: the cell with the largest error is halved in
-// both directions until the errors sum to a share of the result. A cell's value is nine Gauss-Legendre points on each of
-// its quarters, its error the difference to nine points on the whole; so an error is of the coarser rule, and pessimistic.
+// Integrals over a rectangle of functions that are smooth but for a few lines: the cell with the
+// largest error is halved in both directions until the errors sum to a share of the result. A
+// cell's value is nine Gauss-Legendre points on each of its quarters, its error the difference to
+// nine points on the whole; so an error is of the coarser rule, and pessimistic.
 //
-// A feature narrower than a first cell can be missed: the caller says how many to start with. Tested in
-// tests/math/adaptive_cubature_test.cpp.
+// A feature narrower than a first cell can be missed: the caller says how many to start with.
+// Tested in tests/math/adaptive_cubature_test.cpp.
 
 #include <algorithm>
 #include <array>
@@ -25,10 +26,12 @@ struct CubatureSettings {
 
 /// Integral of f(x, y) -> Rgbd over [x0, x1] x [y0, y1].
 template <typename Function>
-Rgbd integrate_rectangle(double x0, double x1, double y0, double y1, const CubatureSettings& settings, Function&& f) {
+Rgbd integrate_rectangle(double x0, double x1, double y0, double y1,
+                         const CubatureSettings& settings, Function&& f) {
   struct Cell {
-    double x, y, width, height;   // lower corner and sizes
-    std::array<Rgbd, 4> quarter;  // integrals: (x low, y low), (high, low), (low, high), (high, high)
+    double x, y, width, height;  // lower corner and sizes
+    // integrals: (x low, y low), (high, low), (low, high), (high, high)
+    std::array<Rgbd, 4> quarter;
     double error;
     bool operator<(const Cell& other) const { return error < other.error; }
   };
@@ -39,7 +42,8 @@ Rgbd integrate_rectangle(double x0, double x1, double y0, double y1, const Cubat
     for (std::size_t a = 0; a < 3; ++a) {
       for (std::size_t b = 0; b < 3; ++b) {
         const double weight = rule.weights[a] * rule.weights[b];
-        sum += weight * f(x + 0.5 * width * (1 + rule.nodes[a]), y + 0.5 * height * (1 + rule.nodes[b]));
+        sum += weight *
+               f(x + 0.5 * width * (1 + rule.nodes[a]), y + 0.5 * height * (1 + rule.nodes[b]));
       }
     }
     points += 9;
@@ -49,7 +53,8 @@ Rgbd integrate_rectangle(double x0, double x1, double y0, double y1, const Cubat
     Cell cell{x, y, width, height, {}, 0};
     Rgbd sum = Rgbd::Zero();
     for (int k = 0; k < 4; ++k) {
-      const Rgbd part = simple(x + 0.5 * width * (k % 2), y + 0.5 * height * (k / 2), 0.5 * width, 0.5 * height);
+      const Rgbd part =
+          simple(x + 0.5 * width * (k % 2), y + 0.5 * height * (k / 2), 0.5 * width, 0.5 * height);
       cell.quarter[static_cast<std::size_t>(k)] = part;
       sum += part;
     }
@@ -80,8 +85,9 @@ Rgbd integrate_rectangle(double x0, double x1, double y0, double y1, const Cubat
     cells.pop_back();
     add(worst, -1);
     for (int k = 0; k < 4; ++k) {
-      cells.push_back(cell_of(worst.x + 0.5 * worst.width * (k % 2), worst.y + 0.5 * worst.height * (k / 2),
-                              0.5 * worst.width, 0.5 * worst.height, worst.quarter[static_cast<std::size_t>(k)]));
+      cells.push_back(cell_of(worst.x + 0.5 * worst.width * (k % 2),
+                              worst.y + 0.5 * worst.height * (k / 2), 0.5 * worst.width,
+                              0.5 * worst.height, worst.quarter[static_cast<std::size_t>(k)]));
       add(cells.back(), 1);
       std::push_heap(cells.begin(), cells.end());
     }

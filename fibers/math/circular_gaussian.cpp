@@ -22,7 +22,8 @@ constexpr double kHalfPi = 0.5 * kPi;
 // Beyond that many widths a Gaussian holds 2e-8 of itself.
 constexpr double kReach = 4;
 
-// Up to this width seven terms of the series in closed form are within 2e-6; above it 16 harmonics are.
+// Up to this width seven terms of the series in closed form are within 2e-6; above it 16 harmonics
+// are.
 constexpr double kWidestSeries = 0.5;
 constexpr int kHarmonics = 16;
 
@@ -81,7 +82,8 @@ T gaussian_near(const T& x, double mean, double sharpness) {
 // The integral of gc from its mean to x, |x - mean| <= pi.
 class Primitive {
  public:
-  explicit Primitive(const CircularGaussian& gaussian) : gaussian_(gaussian), narrow_(gaussian.width <= kWidestSeries) {
+  explicit Primitive(const CircularGaussian& gaussian)
+      : gaussian_(gaussian), narrow_(gaussian.width <= kWidestSeries) {
     if (!narrow_) set_harmonics();
   }
 
@@ -91,12 +93,14 @@ class Primitive {
   }
 
  private:
-  using Harmonics = std::array<double, kHarmonics + 1>;  // [n] of the integral: the mean, then factors of sin(n d)
+  // [n] of the integral: the mean, then factors of sin(n d)
+  using Harmonics = std::array<double, kHarmonics + 1>;
 
   // In u = 2 sin((x - m) / 2) gc dx is exactly exp(-u^2/s^2) du / sqrt(1 - u^2/4), and
-  // 1 / sqrt(1 - u^2/4) = sum over n of binomial(2n, n) (u/4)^(2n). With t = u / s each moment of t^(2n) exp(-t^2)
-  // follows by parts from the one before, m_n = ((2n - 1) m_(n-1) - t^(2n-1) exp(-t^2)) / 2. erf by Abramowitz and
-  // Stegun 7.1.26 (absolute error 1.5e-7), which shares its exponential with the moments.
+  // 1 / sqrt(1 - u^2/4) = sum over n of binomial(2n, n) (u/4)^(2n). With t = u / s each moment of
+  // t^(2n) exp(-t^2) follows by parts from the one before, m_n = ((2n - 1) m_(n-1) - t^(2n-1)
+  // exp(-t^2)) / 2. erf by Abramowitz and Stegun 7.1.26 (absolute error 1.5e-7), which shares its
+  // exponential with the moments.
   template <class T>
   T narrow(const T& x) const {
     const double s = gaussian_.width;
@@ -123,7 +127,8 @@ class Primitive {
     return s * sum;
   }
 
-  // gc = exp(-k) (I0(k) + 2 sum of In(k) cos n(x - m)), k = 2/s^2: ratios by their continued fraction, I0 from gc(m) = 1.
+  // gc = exp(-k) (I0(k) + 2 sum of In(k) cos n(x - m)), k = 2/s^2: ratios by their continued
+  // fraction, I0 from gc(m) = 1.
   void set_harmonics() {
     const double k = sharpness_of_width(gaussian_.width);
     constexpr int kStart = kHarmonics + 12;
@@ -165,8 +170,8 @@ class Primitive {
   Harmonics harmonic_{};
 };
 
-// The integral over the circle for widths up to 0.25: the series of Primitive with the whole moments of exp(-t^2),
-// sqrt(pi) (2n - 1)!! / 2^n.
+// The integral over the circle for widths up to 0.25: the series of Primitive with the whole
+// moments of exp(-t^2), sqrt(pi) (2n - 1)!! / 2^n.
 double whole_narrow(double width) {
   const double step = width * width / 16;  // sum of binomial(2n, n) (2n - 1)!! / 2^n step^n
   return std::sqrt(kPi) * width * (1 + step * (1 + step * (4.5 + step * (37.5 + step * 459.375))));
@@ -193,14 +198,16 @@ int images_of(const CircularGaussian& gaussian, std::array<Image, 5>& images) {
   for (int turn = -2; turn <= 2; ++turn) {
     const double mean = gaussian.mean + turn * 2 * kPi;
     const Interval part = intersection({-kHalfPi, kHalfPi}, {mean - kPi, mean + kPi});
-    if (part.length() > 0) images[static_cast<std::size_t>(count++)] = {{mean, gaussian.width}, part};
+    if (part.length() > 0)
+      images[static_cast<std::size_t>(count++)] = {{mean, gaussian.width}, part};
   }
   return count;
 }
 
-// The visible part over a box: `inner` has the larger share of the gradient. Visible is slope (outer) + inner >= limit,
-// in coordinates as they are, or <= where `flipped`.
-double clipped_box(const Image& inner_image, const Image& outer_image, double limit, double slope, bool visible_above) {
+// The visible part over a box: `inner` has the larger share of the gradient. Visible is slope
+// (outer) + inner >= limit, in coordinates as they are, or <= where `flipped`.
+double clipped_box(const Image& inner_image, const Image& outer_image, double limit, double slope,
+                   bool visible_above) {
   const Interval inner = support(inner_image.gaussian, inner_image.interval);
   const Interval outer = support(outer_image.gaussian, outer_image.interval);
   if (inner.length() <= 0 || outer.length() <= 0) return 0;
@@ -213,7 +220,8 @@ double clipped_box(const Image& inner_image, const Image& outer_image, double li
   if (slope != 0) {
     const double a = (limit - inner.begin) / slope;
     const double b = (limit - inner.end) / slope;
-    cut = {std::clamp(std::min(a, b), outer.begin, outer.end), std::clamp(std::max(a, b), outer.begin, outer.end)};
+    cut = {std::clamp(std::min(a, b), outer.begin, outer.end),
+           std::clamp(std::max(a, b), outer.begin, outer.end)};
   }
   double sum = 0;
   for (const Interval& whole : {Interval{outer.begin, cut.begin}, Interval{cut.end, outer.end}}) {
@@ -233,17 +241,19 @@ double clipped_box(const Image& inner_image, const Image& outer_image, double li
   const double middle = 0.5 * (cut.begin + cut.end);
   const double sharpness = sharpness_of_width(outer_image.gaussian.width);
   const Nodes x = middle + half * Eigen::Map<const Nodes>(rule.nodes.data());
-  const Nodes weight =
-      Eigen::Map<const Nodes>(rule.weights.data()) * gaussian_near(x, outer_image.gaussian.mean, sharpness);
+  const Nodes weight = Eigen::Map<const Nodes>(rule.weights.data()) *
+                       gaussian_near(x, outer_image.gaussian.mean, sharpness);
   const Nodes edge = inner_primitive(Nodes((limit - slope * x).max(inner.begin).min(inner.end)));
-  return sum + half * (weight * (visible_above ? Nodes(at_end - edge) : Nodes(edge - at_begin))).sum();
+  return sum +
+         half * (weight * (visible_above ? Nodes(at_end - edge) : Nodes(edge - at_begin))).sum();
 }
 
 // Panels over [-pi/2, pi/2] that resolve gc, its images included.
 std::vector<double> breaks_of(const CircularGaussian& gaussian) {
   std::vector<double> breaks;
   for (int turn = -2; turn <= 2; ++turn) {
-    append_geometric_breaks(gaussian.mean + turn * 2 * kPi, std::min(gaussian.width, 1.0), kPi, breaks);
+    append_geometric_breaks(gaussian.mean + turn * 2 * kPi, std::min(gaussian.width, 1.0), kPi,
+                            breaks);
   }
   return breaks;
 }
@@ -274,7 +284,8 @@ double width_of_sharpness(double sharpness) {
   return std::sqrt(2 / sharpness);
 }
 
-CircularGaussianProduct circular_gaussian_product(const CircularGaussian& a, const CircularGaussian& b) {
+CircularGaussianProduct circular_gaussian_product(const CircularGaussian& a,
+                                                  const CircularGaussian& b) {
   const double weight_a = 1 / (a.width * a.width);
   const double weight_b = 1 / (b.width * b.width);
   const double half_sine = std::sin(0.5 * (b.mean - a.mean));
@@ -284,7 +295,8 @@ CircularGaussianProduct circular_gaussian_product(const CircularGaussian& a, con
   const double total = length + weight_a + weight_b;
   // |z| - 1/s1^2 - 1/s2^2 without cancellation.
   const double deficit = total > 0 ? 4 * weight_a * weight_b * half_sine * half_sine / total : 0;
-  return {{std::remainder(a.mean + std::atan2(y, x), 2 * kPi), 1 / std::sqrt(length)}, std::exp(-2 * deficit)};
+  return {{std::remainder(a.mean + std::atan2(y, x), 2 * kPi), 1 / std::sqrt(length)},
+          std::exp(-2 * deficit)};
 }
 
 double circular_gaussian_mass(const CircularGaussian& gaussian, double begin, double end) {
@@ -293,14 +305,19 @@ double circular_gaussian_mass(const CircularGaussian& gaussian, double begin, do
   return primitive(end) - primitive(begin);
 }
 
-double clipped_gaussians(const CircularGaussian& theta, const CircularGaussian& phi, const VisibilityLine& line) {
-  // All of two narrow Gaussians within the domain and on one side: 4.2 widths in the angle are kReach in u.
+double clipped_gaussians(const CircularGaussian& theta, const CircularGaussian& phi,
+                         const VisibilityLine& line) {
+  // All of two narrow Gaussians within the domain and on one side: 4.2 widths in the angle are
+  // kReach in u.
   if (theta.width <= 0.25 && phi.width <= 0.25) {
     const double reach_theta = 4.2 * theta.width;
     const double reach_phi = 4.2 * phi.width;
-    const double reach = reach_theta * std::abs(line.theta_gradient) + reach_phi * std::abs(line.phi_gradient);
-    const bool inside = std::abs(theta.mean) + reach_theta <= kHalfPi && std::abs(phi.mean) + reach_phi <= kHalfPi;
-    if (inside && line.distance >= reach) return whole_narrow(theta.width) * whole_narrow(phi.width);
+    const double reach =
+        reach_theta * std::abs(line.theta_gradient) + reach_phi * std::abs(line.phi_gradient);
+    const bool inside =
+        std::abs(theta.mean) + reach_theta <= kHalfPi && std::abs(phi.mean) + reach_phi <= kHalfPi;
+    if (inside && line.distance >= reach)
+      return whole_narrow(theta.width) * whole_narrow(phi.width);
     if (inside && line.distance <= -reach) return 0;
   }
   const bool theta_is_inner = std::abs(line.theta_gradient) >= std::abs(line.phi_gradient);
@@ -318,8 +335,9 @@ double clipped_gaussians(const CircularGaussian& theta, const CircularGaussian& 
   double sum = 0;
   for (int i = 0; i < inner_count; ++i) {
     for (int o = 0; o < outer_count; ++o) {
-      sum += clipped_box(inner_images[static_cast<std::size_t>(i)], outer_images[static_cast<std::size_t>(o)], limit,
-                         slope, inner_gradient > 0);
+      sum +=
+          clipped_box(inner_images[static_cast<std::size_t>(i)],
+                      outer_images[static_cast<std::size_t>(o)], limit, slope, inner_gradient > 0);
     }
   }
   return sum;
@@ -351,7 +369,8 @@ Float8 gaussian8(Float8 x, const CircularGaussian8& gaussian) {
   return exp8(-u * u);
 }
 
-// Primitive for eight at a time: the series (three terms) for narrow Gaussians, harmonics for the others.
+// Primitive for eight at a time: the series (three terms) for narrow Gaussians, harmonics for the
+// others.
 class Primitive8 {
  public:
   explicit Primitive8(const CircularGaussian8& gaussian)
@@ -433,20 +452,25 @@ struct Interval8 {
 Interval8 support8(const CircularGaussian8& gaussian) {
   const Float8 half_sine = min8(0.5F * kReach8 * gaussian.width, splat8(0.75F));
   const Float8 narrow_reach = 2 * atan2_8(half_sine, sqrt8(1 - half_sine * half_sine));
-  const Float8 reach = gaussian.width <= static_cast<float>(kWidestSeries) ? narrow_reach : splat8(10);
-  return {max8(gaussian.mean - reach, splat8(-kHalfPi8)), min8(gaussian.mean + reach, splat8(kHalfPi8))};
+  const Float8 reach =
+      gaussian.width <= static_cast<float>(kWidestSeries) ? narrow_reach : splat8(10);
+  return {max8(gaussian.mean - reach, splat8(-kHalfPi8)),
+          min8(gaussian.mean + reach, splat8(kHalfPi8))};
 }
 
 }  // namespace
 
-Float8 clipped_gaussians(const CircularGaussian8& theta, const CircularGaussian8& phi, const VisibilityLine8& line) {
+Float8 clipped_gaussians(const CircularGaussian8& theta, const CircularGaussian8& phi,
+                         const VisibilityLine8& line) {
   static const Rule8<12> along_cut;
   static const Rule8<10> beside_cut;
   const Int8 theta_is_inner = abs8(line.theta_gradient) >= abs8(line.phi_gradient);
   const Float8 inner_gradient = theta_is_inner ? line.theta_gradient : line.phi_gradient;
   const Float8 outer_gradient = theta_is_inner ? line.phi_gradient : line.theta_gradient;
-  const CircularGaussian8 inner = {theta_is_inner ? theta.mean : phi.mean, theta_is_inner ? theta.width : phi.width};
-  const CircularGaussian8 outer = {theta_is_inner ? phi.mean : theta.mean, theta_is_inner ? phi.width : theta.width};
+  const CircularGaussian8 inner = {theta_is_inner ? theta.mean : phi.mean,
+                                   theta_is_inner ? theta.width : phi.width};
+  const CircularGaussian8 outer = {theta_is_inner ? phi.mean : theta.mean,
+                                   theta_is_inner ? phi.width : theta.width};
   const Float8 raw_slope = outer_gradient / inner_gradient;
   const Float8 slope = abs8(raw_slope) < 1e-6F ? splat8(1e-6F) : raw_slope;
   const Float8 limit = inner.mean + slope * outer.mean - line.distance / inner_gradient;
@@ -454,18 +478,22 @@ Float8 clipped_gaussians(const CircularGaussian8& theta, const CircularGaussian8
 
   const Interval8 inner_support = support8(inner);
   const Interval8 outer_support = support8(outer);
-  const Int8 empty = (inner_support.begin >= inner_support.end) | (outer_support.begin >= outer_support.end);
+  const Int8 empty =
+      (inner_support.begin >= inner_support.end) | (outer_support.begin >= outer_support.end);
   const Primitive8 primitive(inner);
   const Float8 at_begin = primitive(inner_support.begin);
   const Float8 at_end = primitive(inner_support.end);
 
   // Where the line crosses the inner support, and the part on its visible side.
-  const auto clamped = [&](Float8 x) { return max8(min8(x, outer_support.end), outer_support.begin); };
+  const auto clamped = [&](Float8 x) {
+    return max8(min8(x, outer_support.end), outer_support.begin);
+  };
   const Float8 a = clamped((limit - inner_support.begin) / slope);
   const Float8 b = clamped((limit - inner_support.end) / slope);
   const Interval8 cut = {min8(a, b), max8(a, b)};
   const Int8 beyond = (slope > 0) == above;
-  const Interval8 whole = {beyond ? cut.end : outer_support.begin, beyond ? outer_support.end : cut.begin};
+  const Interval8 whole = {beyond ? cut.end : outer_support.begin,
+                           beyond ? outer_support.end : cut.begin};
 
   Float8 sum = {};
   const Float8 half = 0.5F * (cut.end - cut.begin);
@@ -473,7 +501,8 @@ Float8 clipped_gaussians(const CircularGaussian8& theta, const CircularGaussian8
     const Float8 middle = 0.5F * (cut.begin + cut.end);
     for (std::size_t k = 0; k < along_cut.node.size(); ++k) {
       const Float8 x = middle + half * along_cut.node[k];
-      const Float8 edge = primitive(max8(min8(limit - slope * x, inner_support.end), inner_support.begin));
+      const Float8 edge =
+          primitive(max8(min8(limit - slope * x, inner_support.end), inner_support.begin));
       sum += along_cut.weight[k] * gaussian8(x, outer) * (above ? at_end - edge : edge - at_begin);
     }
     sum *= half;
@@ -492,8 +521,8 @@ Float8 clipped_gaussians(const CircularGaussian8& theta, const CircularGaussian8
 
 double clipped_gaussians_quadrature(const CircularGaussian& theta, const CircularGaussian& phi,
                                     const VisibilityLine& line) {
-  // The angle with the larger share of the gradient is integrated inside, so that its limit moves at most as fast as the
-  // other angle.
+  // The angle with the larger share of the gradient is integrated inside, so that its limit moves
+  // at most as fast as the other angle.
   const bool theta_is_inner = std::abs(line.theta_gradient) >= std::abs(line.phi_gradient);
   const CircularGaussian& inner = theta_is_inner ? theta : phi;
   const CircularGaussian& outer = theta_is_inner ? phi : theta;
@@ -501,7 +530,8 @@ double clipped_gaussians_quadrature(const CircularGaussian& theta, const Circula
   const double outer_gradient = theta_is_inner ? line.phi_gradient : line.theta_gradient;
   std::vector<double> breaks = breaks_of(outer);
   if (outer_gradient != 0) {
-    const auto crossing = [&](double x) {  // outer coordinate at which the line passes the inner one
+    // outer coordinate at which the line passes the inner one
+    const auto crossing = [&](double x) {
       return outer.mean - (line.distance + inner_gradient * (x - inner.mean)) / outer_gradient;
     };
     breaks.push_back(crossing(-kHalfPi));
@@ -512,16 +542,19 @@ double clipped_gaussians_quadrature(const CircularGaussian& theta, const Circula
     }
   }
   return integrate(gauss_legendre_panels(16, -kHalfPi, kHalfPi, breaks), [&](double x) {
-    const double edge = std::clamp(inner.mean - (line.distance + outer_gradient * (x - outer.mean)) / inner_gradient,
-                                   -kHalfPi, kHalfPi);
-    return circular_gaussian(outer, x) *
-           (inner_gradient > 0 ? mass_by_panels(inner, edge, kHalfPi) : mass_by_panels(inner, -kHalfPi, edge));
+    const double edge = std::clamp(
+        inner.mean - (line.distance + outer_gradient * (x - outer.mean)) / inner_gradient, -kHalfPi,
+        kHalfPi);
+    return circular_gaussian(outer, x) * (inner_gradient > 0
+                                              ? mass_by_panels(inner, edge, kHalfPi)
+                                              : mass_by_panels(inner, -kHalfPi, edge));
   });
 }
 
 double unoccluded_gaussians_printed(const CircularGaussian& theta, const CircularGaussian& phi) {
   const auto share = [](const CircularGaussian& gaussian) {
-    return erf_difference((-kHalfPi - gaussian.mean) / gaussian.width, (kHalfPi - gaussian.mean) / gaussian.width);
+    return erf_difference((-kHalfPi - gaussian.mean) / gaussian.width,
+                          (kHalfPi - gaussian.mean) / gaussian.width);
   };
   return 0.25 * kPi * theta.width * phi.width * share(theta) * share(phi);
 }
@@ -529,12 +562,14 @@ double unoccluded_gaussians_printed(const CircularGaussian& theta, const Circula
 double visible_share(double theta_width, double phi_width, const VisibilityLine& line) {
   const CircularGaussian theta{0, theta_width};
   const CircularGaussian phi{0, phi_width};
-  return clipped_gaussians(theta, phi, line) /
-         (circular_gaussian_mass(theta, -kHalfPi, kHalfPi) * circular_gaussian_mass(phi, -kHalfPi, kHalfPi));
+  return clipped_gaussians(theta, phi, line) / (circular_gaussian_mass(theta, -kHalfPi, kHalfPi) *
+                                                circular_gaussian_mass(phi, -kHalfPi, kHalfPi));
 }
 
-double sigmoid_gain(double theta_width, double phi_width, double theta_gradient, double phi_gradient) {
-  // The share is odd about distance 0, and 1 from where the line leaves the domain or the Gaussians behind.
+double sigmoid_gain(double theta_width, double phi_width, double theta_gradient,
+                    double phi_gradient) {
+  // The share is odd about distance 0, and 1 from where the line leaves the domain or the Gaussians
+  // behind.
   const double domain = kHalfPi * (std::abs(theta_gradient) + std::abs(phi_gradient));
   const double spread = std::hypot(theta_width * theta_gradient, phi_width * phi_gradient);
   const double reach = std::min(domain, 4 * spread);
@@ -574,7 +609,8 @@ constexpr double kNarrowestGain = 0.005;
 constexpr double kWidestGain = 3;
 
 // The line's extent across the two Gaussians, limited as the domain limits it.
-double line_spread(double theta_width, double phi_width, double theta_gradient, double phi_gradient) {
+double line_spread(double theta_width, double phi_width, double theta_gradient,
+                   double phi_gradient) {
   return std::hypot(std::min(theta_width, kWidestGain) * theta_gradient,
                     std::min(phi_width, kWidestGain) * phi_gradient);
 }
@@ -585,17 +621,21 @@ SigmoidGains::SigmoidGains() {
   for (int i = 0; i < kWidths; ++i) {
     for (int j = 0; j < kWidths; ++j) {
       for (int g = 0; g < kGradients; ++g) {
-        const double theta_width = kNarrowestGain * std::pow(kWidestGain / kNarrowestGain, i / (kWidths - 1.0));
-        const double phi_width = kNarrowestGain * std::pow(kWidestGain / kNarrowestGain, j / (kWidths - 1.0));
+        const double theta_width =
+            kNarrowestGain * std::pow(kWidestGain / kNarrowestGain, i / (kWidths - 1.0));
+        const double phi_width =
+            kNarrowestGain * std::pow(kWidestGain / kNarrowestGain, j / (kWidths - 1.0));
         const double gradient = kHalfPi * g / (kGradients - 1.0);
-        gains_.push_back(sigmoid_gain(theta_width, phi_width, std::cos(gradient), std::sin(gradient)) *
-                         line_spread(theta_width, phi_width, std::cos(gradient), std::sin(gradient)));
+        gains_.push_back(
+            sigmoid_gain(theta_width, phi_width, std::cos(gradient), std::sin(gradient)) *
+            line_spread(theta_width, phi_width, std::cos(gradient), std::sin(gradient)));
       }
     }
   }
 }
 
-double SigmoidGains::gain(double theta_width, double phi_width, double theta_gradient, double phi_gradient) const {
+double SigmoidGains::gain(double theta_width, double phi_width, double theta_gradient,
+                          double phi_gradient) const {
   struct Between {
     int low;
     double share;
@@ -606,23 +646,27 @@ double SigmoidGains::gain(double theta_width, double phi_width, double theta_gra
     return Between{low, at - low};
   };
   const auto of_width = [&](double width) {
-    return between(std::log(width / kNarrowestGain) / std::log(kWidestGain / kNarrowestGain) * (kWidths - 1), kWidths);
+    return between(
+        std::log(width / kNarrowestGain) / std::log(kWidestGain / kNarrowestGain) * (kWidths - 1),
+        kWidths);
   };
   const Between i = of_width(theta_width);
   const Between j = of_width(phi_width);
-  const Between g =
-      between(std::atan2(std::abs(phi_gradient), std::abs(theta_gradient)) / kHalfPi * (kGradients - 1), kGradients);
+  const Between g = between(
+      std::atan2(std::abs(phi_gradient), std::abs(theta_gradient)) / kHalfPi * (kGradients - 1),
+      kGradients);
   double sum = 0;
   for (int corner = 0; corner < 8; ++corner) {
     const int a = corner & 1;
     const int b = (corner >> 1) & 1;
     const int c = corner >> 2;
-    const auto index = static_cast<std::size_t>(((i.low + a) * kWidths + j.low + b) * kGradients + g.low + c);
-    sum += (a != 0 ? i.share : 1 - i.share) * (b != 0 ? j.share : 1 - j.share) * (c != 0 ? g.share : 1 - g.share) *
-           gains_[index];
+    const auto index =
+        static_cast<std::size_t>(((i.low + a) * kWidths + j.low + b) * kGradients + g.low + c);
+    sum += (a != 0 ? i.share : 1 - i.share) * (b != 0 ? j.share : 1 - j.share) *
+           (c != 0 ? g.share : 1 - g.share) * gains_[index];
   }
-  return sum / line_spread(std::max(theta_width, kNarrowestGain), std::max(phi_width, kNarrowestGain), theta_gradient,
-                           phi_gradient);
+  return sum / line_spread(std::max(theta_width, kNarrowestGain),
+                           std::max(phi_width, kNarrowestGain), theta_gradient, phi_gradient);
 }
 
 }  // namespace heddle

@@ -11,7 +11,8 @@ namespace heddle {
 HemisphereDual::HemisphereDual(int order) : order_(order) {
   for (int m = 0; m <= order; ++m) {
     const int n = order + 1 - m;
-    // Over z exactly; over the azimuth cos^2(m phi) integrates to pi (2 pi for m = 0), which phi = 0 stands for.
+    // Over z exactly; over the azimuth cos^2(m phi) integrates to pi (2 pi for m = 0), which phi =
+    // 0 stands for.
     Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(n, n);
     const QuadratureRule rule = gauss_legendre(order + 1, 0, 1);
     std::array<double, sh_count(kMaxShOrder)> y;
@@ -19,16 +20,19 @@ HemisphereDual::HemisphereDual(int order) : order_(order) {
       const double z = rule.nodes[k];
       evaluate_sh(order, Vec3d(std::sqrt(1 - z * z), 0, z), y.data());
       Eigen::VectorXd values(n);
-      for (int i = 0; i < n; ++i) values[i] = y[static_cast<std::size_t>((m + i) * (m + i + 1) + m)];
+      for (int i = 0; i < n; ++i)
+        values[i] = y[static_cast<std::size_t>((m + i) * (m + i + 1) + m)];
       gram += rule.weights[k] * (m == 0 ? 2 : 1) * kPi * values * values.transpose();
     }
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(gram);
     Eigen::VectorXd inverse = solver.eigenvalues();
     for (int i = 0; i < n; ++i) inverse[i] = inverse[i] < kLeastShare ? 0.0 : 1 / inverse[i];
-    const Eigen::MatrixXd block = solver.eigenvectors() * inverse.asDiagonal() * solver.eigenvectors().transpose();
+    const Eigen::MatrixXd block =
+        solver.eigenvectors() * inverse.asDiagonal() * solver.eigenvectors().transpose();
     std::vector<float>& stored = blocks_[static_cast<std::size_t>(m)];
     for (int row = 0; row < n; ++row) {
-      for (int column = 0; column < n; ++column) stored.push_back(static_cast<float>(block(row, column)));
+      for (int column = 0; column < n; ++column)
+        stored.push_back(static_cast<float>(block(row, column)));
     }
   }
 }

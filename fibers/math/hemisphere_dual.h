@@ -2,12 +2,14 @@
 #define HEDDLE_FIBERS_MATH_HEMISPHERE_DUAL_H_
 // A function on the upper hemisphere from its moments against spherical harmonics.
 //
-// Known are m_j = integral over z > 0 of T Y_j. Summing m_j Y_j, as on the whole sphere, takes T for 0 below the horizon:
-// the step rings. On the hemisphere alone the harmonics are not orthogonal; with G_jk = integral over z > 0 of Y_j Y_k the
-// best approximation in the mean square is sum_j (G^+ m)_j Y_j, so what weighs the moments is d(w) = G^+ Y(w). G is close to
-// singular: harmonics of order 5 hold functions that live almost wholly below the horizon. Eigenvalues below kLeastShare
-// are left out of the inverse, or the noise of the moments would be amplified. 26 of 36 directions are left at order 5;
-// an odd continuation below the horizon uses 15. Tested in tests/math/hemisphere_dual_test.cpp.
+// Known are m_j = integral over z > 0 of T Y_j. Summing m_j Y_j, as on the whole sphere, takes T
+// for 0 below the horizon: the step rings. On the hemisphere alone the harmonics are not
+// orthogonal; with G_jk = integral over z > 0 of Y_j Y_k the best approximation in the mean square
+// is sum_j (G^+ m)_j Y_j, so what weighs the moments is d(w) = G^+ Y(w). G is close to singular:
+// harmonics of order 5 hold functions that live almost wholly below the horizon. Eigenvalues below
+// kLeastShare are left out of the inverse, or the noise of the moments would be amplified. 26 of 36
+// directions are left at order 5; an odd continuation below the horizon uses 15. Tested in
+// tests/math/hemisphere_dual_test.cpp.
 
 #include <array>
 #include <vector>
@@ -18,8 +20,9 @@ namespace heddle {
 
 class HemisphereDual {
  public:
-  /// Share of a function's square that must lie above the horizon. Between 0.01 and 0.1 lies only one gap's choice at
-  /// order 5: the eigenvalues near are 0.011 and 0.09. The figures that chose 0.05: docs/performance.md.
+  /// Share of a function's square that must lie above the horizon. Between 0.01 and 0.1 lies only
+  /// one gap's choice at order 5: the eigenvalues near are 0.011 and 0.09. The figures that chose
+  /// 0.05: docs/performance.md.
   static constexpr double kLeastShare = 0.05;
 
   /// One object per order, kept. order <= kMaxShOrder.
@@ -31,7 +34,8 @@ class HemisphereDual {
  private:
   explicit HemisphereDual(int order);
   int order_;
-  // [|m|] (order + 1 - |m|)^2, row-major over l = |m| .. order: G couples equal m only, and equally for both signs.
+  // [|m|] (order + 1 - |m|)^2, row-major over l = |m| .. order: G couples equal m only, and equally
+  // for both signs.
   std::array<std::vector<float>, kMaxShOrder + 1> blocks_;
 };
 

@@ -1,11 +1,13 @@
 #ifndef HEDDLE_FIBERS_MATH_NONNEGATIVE_LEAST_SQUARES_H_
 #define HEDDLE_FIBERS_MATH_NONNEGATIVE_LEAST_SQUARES_H_
-// min |A w - y|^2 over w >= 0, given the normal equations: gram = A^T A (positive definite), right_side = A^T y.
+// min |A w - y|^2 over w >= 0, given the normal equations: gram = A^T A (positive definite),
+// right_side = A^T y.
 //
-// Coordinate descent with the gradient kept up to date: each step solves one coordinate exactly, so the error falls
-// monotonically to the one minimum. It ends when the optimality conditions (gradient 0 where w > 0, not negative where
-// w = 0) hold to kTolerance of the largest entry of the right side, or after kMaxSweeps (a nearly singular gram).
-// Tested in tests/math/nonnegative_least_squares_test.cpp.
+// Coordinate descent with the gradient kept up to date: each step solves one coordinate exactly, so
+// the error falls monotonically to the one minimum. It ends when the optimality conditions
+// (gradient 0 where w > 0, not negative where w = 0) hold to kTolerance of the largest entry of the
+// right side, or after kMaxSweeps (a nearly singular gram). Tested in
+// tests/math/nonnegative_least_squares_test.cpp.
 
 #include <algorithm>
 #include <cassert>
@@ -15,7 +17,8 @@
 
 namespace heddle {
 
-inline Eigen::VectorXd nonnegative_least_squares(const Eigen::MatrixXd& gram, const Eigen::VectorXd& right_side) {
+inline Eigen::VectorXd nonnegative_least_squares(const Eigen::MatrixXd& gram,
+                                                 const Eigen::VectorXd& right_side) {
   constexpr double kTolerance = 1e-6;
   constexpr int kMaxSweeps = 2000;
   assert(gram.rows() == right_side.size() && gram.cols() == right_side.size());

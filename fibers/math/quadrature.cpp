@@ -39,10 +39,10 @@ QuadratureRule make_gauss_legendre(int count) {
   return rule;
 }
 
-// Golub and Welsch 1969: the eigenvalues of the Jacobi matrix are the nodes, the first components of the
-// eigenvectors give the weights.
-QuadratureRule from_jacobi_matrix(const Eigen::VectorXd& diagonal, const Eigen::VectorXd& off_diagonal,
-                                  double mass) {
+// Golub and Welsch 1969: the eigenvalues of the Jacobi matrix are the nodes, the first components
+// of the eigenvectors give the weights.
+QuadratureRule from_jacobi_matrix(const Eigen::VectorXd& diagonal,
+                                  const Eigen::VectorXd& off_diagonal, double mass) {
   Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver;
   solver.computeFromTridiagonal(diagonal, off_diagonal, Eigen::ComputeEigenvectors);
   QuadratureRule rule;
@@ -61,7 +61,8 @@ QuadratureRule make_gauss_hermite(int count) {
 }
 
 template <typename Make>
-const QuadratureRule& cached(int count, std::map<int, QuadratureRule>& rules, std::mutex& mutex, Make make) {
+const QuadratureRule& cached(int count, std::map<int, QuadratureRule>& rules, std::mutex& mutex,
+                             Make make) {
   assert(count >= 1 && "a quadrature rule needs a node");
   const std::lock_guard<std::mutex> lock(mutex);
   auto found = rules.find(count);
@@ -101,7 +102,8 @@ QuadratureRule gauss_legendre_panels(int count, double a, double b, std::vector<
   return rule;
 }
 
-void append_geometric_breaks(double centre, double scale, double reach, std::vector<double>& breaks) {
+void append_geometric_breaks(double centre, double scale, double reach,
+                             std::vector<double>& breaks) {
   assert(scale > 0.0 && "a panel needs a width");
   breaks.push_back(centre);
   for (double offset = scale; offset < reach; offset *= 2.0) {
@@ -118,8 +120,8 @@ const QuadratureRule& gauss_hermite(int count) {
 
 ThreeNodeRule cut_gauss_hermite3(double cut) {
   assert(cut >= -3.0 && "the cut weight would be negligible");
-  // Stieltjes' procedure: recurrence coefficients of the orthogonal polynomials from inner products on a fine
-  // rule.
+  // Stieltjes' procedure: recurrence coefficients of the orthogonal polynomials from inner products
+  // on a fine rule.
   constexpr double kReach = 6.5;  // exp(-6.5^2) = 4e-19
   const QuadratureRule fine = gauss_legendre(80, -kReach, std::min(cut, kReach));
   Eigen::Vector3d diagonal;
@@ -132,7 +134,8 @@ ThreeNodeRule cut_gauss_hermite3(double cut) {
     double norm = 0.0;
     double moment = 0.0;
     for (std::size_t k = 0; k < fine.nodes.size(); ++k) {
-      const double w = fine.weights[k] * std::exp(-fine.nodes[k] * fine.nodes[k]) * current[k] * current[k];
+      const double w =
+          fine.weights[k] * std::exp(-fine.nodes[k] * fine.nodes[k]) * current[k] * current[k];
       norm += w;
       moment += w * fine.nodes[k];
     }

@@ -1,8 +1,8 @@
 #ifndef HEDDLE_FIBERS_MATH_QUADRATURE_H_
 #define HEDDLE_FIBERS_MATH_QUADRATURE_H_
 // Gaussian quadrature in double precision: Gauss-Legendre on an interval or on a chain of panels,
-// Gauss-Hermite for the weight exp(-x^2) on the real line, and the three-node Gauss rule for that weight cut
-// off at one end.
+// Gauss-Hermite for the weight exp(-x^2) on the real line, and the three-node Gauss rule for that
+// weight cut off at one end.
 //
 // Nodes are ascending. Rules on [-1, 1] and Hermite rules are computed once per node count and kept
 // (thread-safe). Tested in tests/math/quadrature_test.cpp.
@@ -25,14 +25,15 @@ const QuadratureRule& gauss_legendre(int count);
 /// The same on [a, b].
 QuadratureRule gauss_legendre(int count, double a, double b);
 
-/// Gauss-Legendre with `count` nodes on each panel between successive breaks. Breaks are sorted here; those
-/// outside [a, b] are dropped and a and b added, so a caller may list every scale at which its integrand
-/// changes.
+/// Gauss-Legendre with `count` nodes on each panel between successive breaks. Breaks are sorted
+/// here; those outside [a, b] are dropped and a and b added, so a caller may list every scale at
+/// which its integrand changes.
 QuadratureRule gauss_legendre_panels(int count, double a, double b, std::vector<double> breaks);
 
-/// Breaks at centre and centre +- scale * 2^j until `reach`: panels that resolve a feature of that width and
-/// what is around it. Appends to breaks. scale > 0.
-void append_geometric_breaks(double centre, double scale, double reach, std::vector<double>& breaks);
+/// Breaks at centre and centre +- scale * 2^j until `reach`: panels that resolve a feature of that
+/// width and what is around it. Appends to breaks. scale > 0.
+void append_geometric_breaks(double centre, double scale, double reach,
+                             std::vector<double>& breaks);
 
 /// Gauss-Hermite rule for the weight exp(-x^2) on the real line.
 const QuadratureRule& gauss_hermite(int count);
@@ -42,7 +43,8 @@ struct ThreeNodeRule {
   std::array<double, 3> weights;
 };
 
-/// Gauss rule for the weight exp(-x^2) on (-infinity, cut]: exact for polynomials of degree 5. cut >= -3.
+/// Gauss rule for the weight exp(-x^2) on (-infinity, cut]: exact for polynomials of degree 5. cut
+/// >= -3.
 ThreeNodeRule cut_gauss_hermite3(double cut);
 
 /// Sum of weight * f(node). f returns a number or a fixed-size Eigen array by value.

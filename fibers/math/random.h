@@ -1,10 +1,11 @@
 #ifndef HEDDLE_FIBERS_MATH_RANDOM_H_
 #define HEDDLE_FIBERS_MATH_RANDOM_H_
-// Counter-based random numbers: every draw is a pure function of its address (seed, stage, item, sample, dimension),
-// so results depend neither on the number of threads nor on how work is cut, and any sample can be drawn again alone.
+// Counter-based random numbers: every draw is a pure function of its address (seed, stage, item,
+// sample, dimension), so results depend neither on the number of threads nor on how work is cut,
+// and any sample can be drawn again alone.
 //
-// The address is hashed to a 64-bit key; draw number d is the SplitMix64 finaliser (Steele, Lea, Flood 2014) of
-// key + d * golden ratio. Tested in tests/math/random_test.cpp.
+// The address is hashed to a 64-bit key; draw number d is the SplitMix64 finaliser (Steele, Lea,
+// Flood 2014) of key + d * golden ratio. Tested in tests/math/random_test.cpp.
 
 #include <cstdint>
 
@@ -26,7 +27,8 @@ enum class RandomStage : std::uint32_t {
   kWovenIrregularity = 12,
 };
 
-/// SplitMix64 finaliser: a bijection of 64-bit words whose output bits all depend on all input bits.
+/// SplitMix64 finaliser: a bijection of 64-bit words whose output bits all depend on all input
+/// bits.
 constexpr std::uint64_t mix64(std::uint64_t x) {
   x ^= x >> 30;
   x *= 0xbf58476d1ce4e5b9ULL;
@@ -39,7 +41,8 @@ constexpr std::uint64_t mix64(std::uint64_t x) {
 class RandomStream {
  public:
   RandomStream(std::uint64_t seed, RandomStage stage, std::uint64_t item, std::uint64_t sample)
-      : key_(mix64(mix64(mix64(mix64(seed + kGolden) ^ (static_cast<std::uint64_t>(stage) * 0xd6e8feb86659fd93ULL)) +
+      : key_(mix64(mix64(mix64(mix64(seed + kGolden) ^
+                               (static_cast<std::uint64_t>(stage) * 0xd6e8feb86659fd93ULL)) +
                          item * 0xa0761d6478bd642fULL) ^
                    (sample * 0xe7037ed1a0b428dbULL + kGolden))) {}
 
@@ -53,7 +56,9 @@ class RandomStream {
   double uniform_double() { return static_cast<double>(bits() >> 11) * 0x1p-53; }
 
   /// Uniform in {0 .. count - 1}; the bias is below count / 2^32. count must be below 2^32.
-  std::uint32_t index(std::uint64_t count) { return static_cast<std::uint32_t>(((bits() >> 32) * count) >> 32); }
+  std::uint32_t index(std::uint64_t count) {
+    return static_cast<std::uint32_t>(((bits() >> 32) * count) >> 32);
+  }
 
  private:
   static constexpr std::uint64_t kGolden = 0x9e3779b97f4a7c15ULL;

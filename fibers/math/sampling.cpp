@@ -54,15 +54,18 @@ float spherical_gaussian_pdf(const Vec3& axis, float sharpness, const Vec3& dire
   return std::exp(-0.5F * sharpness * (direction - axis).squaredNorm()) / sg_mass(sharpness);
 }
 
-VonMisesSampler::VonMisesSampler(double concentration) : concentration_(concentration), envelope_(0.0) {
+VonMisesSampler::VonMisesSampler(double concentration)
+    : concentration_(concentration), envelope_(0.0) {
   assert(concentration >= 0.0);
-  // rho = (t - sqrt(2 t)) / (2 k), t = 1 + sqrt(1 + 4 k^2), and r = (1 + rho^2) / (2 rho); written without
-  // cancellation: t - sqrt(2 t) = sqrt(t) (sqrt(t) - sqrt(2)) = sqrt(t) (t - 2) / (sqrt(t) + sqrt(2)).
+  // rho = (t - sqrt(2 t)) / (2 k), t = 1 + sqrt(1 + 4 k^2), and r = (1 + rho^2) / (2 rho); written
+  // without cancellation: t - sqrt(2 t) = sqrt(t) (sqrt(t) - sqrt(2)) = sqrt(t) (t - 2) / (sqrt(t)
+  // + sqrt(2)).
   const double root = std::sqrt(1.0 + 4.0 * concentration * concentration);
   const double t = 1.0 + root;
   const double t_minus_2 = 4.0 * concentration * concentration / (root + 1.0);
   if (concentration > 1e-8) {
-    const double rho = std::sqrt(t) * t_minus_2 / ((std::sqrt(t) + std::sqrt(2.0)) * 2.0 * concentration);
+    const double rho =
+        std::sqrt(t) * t_minus_2 / ((std::sqrt(t) + std::sqrt(2.0)) * 2.0 * concentration);
     envelope_ = (1.0 - rho) * (1.0 - rho) / (2.0 * rho);
   }
 }
@@ -86,8 +89,8 @@ float VonMisesSampler::sample(RandomStream& random) const {
 float sample_cut_gaussian(float mean, float deviation, RandomStream& random) {
   assert(std::abs(mean) <= 0.5F * kPif + 1e-6F && deviation > 0.0F);
   while (true) {
-    // Box and Muller: two normal deviates from two uniforms; the second is tried when the first falls
-    // outside.
+    // Box and Muller: two normal deviates from two uniforms; the second is tried when the first
+    // falls outside.
     const float radius = deviation * std::sqrt(-2.0F * std::log(1.0F - random.uniform()));
     const float phi = 2.0F * kPif * random.uniform();
     const float first = mean + radius * std::cos(phi);

@@ -9,8 +9,8 @@
 namespace heddle {
 namespace {
 
-// Entries of J that are not 0, band after band, row after row; indices are those of the whole coefficient
-// vector.
+// Entries of J that are not 0, band after band, row after row; indices are those of the whole
+// coefficient vector.
 template <typename T>
 struct SwapMatrix {
   struct Entry {
@@ -18,9 +18,11 @@ struct SwapMatrix {
     T value;
   };
   std::vector<Entry> entries;
-  std::array<std::int32_t, sh_count(kMaxShOrder) + 1> first{};  // row j owns entries first[j] .. first[j + 1]
+  // row j owns entries first[j] .. first[j + 1]
+  std::array<std::int32_t, sh_count(kMaxShOrder) + 1> first{};
 
-  // J[j][k] = integral of Y_j(swapped w) Y_k(w), exact with 12 Gauss-Legendre nodes in z and 24 angles.
+  // J[j][k] = integral of Y_j(swapped w) Y_k(w), exact with 12 Gauss-Legendre nodes in z and 24
+  // angles.
   SwapMatrix() {
     constexpr int kCount = sh_count(kMaxShOrder);
     constexpr int kAngles = 24;
@@ -75,8 +77,8 @@ ShRotation::ShRotation(int order, const Mat3d& rotation) : order_(order) {
   assert(order >= 0 && order <= kMaxShOrder);
   assert((rotation * rotation.transpose() - Mat3d::Identity()).cwiseAbs().maxCoeff() < 1e-3 &&
          rotation.determinant() > 0.0 && "not a rotation");
-  // Angles a and b from the last column. Where it is almost z, a is arbitrary, and g is read from the second
-  // row of Rz(-a) R, so that a + g is right even then.
+  // Angles a and b from the last column. Where it is almost z, a is arbitrary, and g is read from
+  // the second row of Rz(-a) R, so that a + g is right even then.
   const double tilt = std::hypot(rotation(0, 2), rotation(1, 2));
   const double cos_a = tilt > 0.0 ? rotation(0, 2) / tilt : 1.0;
   const double sin_a = tilt > 0.0 ? rotation(1, 2) / tilt : 0.0;
@@ -121,7 +123,8 @@ void ShRotation::rotate(const T* in, T* out) const {
       }
     }
   };
-  const auto swap = [&matrix, count](const std::array<Value, kCount>& from, std::array<Value, kCount>& to) {
+  const auto swap = [&matrix, count](const std::array<Value, kCount>& from,
+                                     std::array<Value, kCount>& to) {
     for (int j = 0; j < count; ++j) {
       const auto row = static_cast<std::size_t>(j);
       Value sum = Value::Zero();

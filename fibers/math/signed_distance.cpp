@@ -14,7 +14,8 @@ constexpr float kFar = 16;
 double squared_chord(double polar_a, double polar_b, double azimuth) {
   const double half_polar = std::sin(0.5 * (polar_a - polar_b));
   const double half_azimuth = std::sin(0.5 * azimuth);
-  return 4 * (half_polar * half_polar + std::sin(polar_a) * std::sin(polar_b) * half_azimuth * half_azimuth);
+  return 4 * (half_polar * half_polar +
+              std::sin(polar_a) * std::sin(polar_b) * half_azimuth * half_azimuth);
 }
 
 // Distance on the circle, 0 .. pi.
@@ -22,8 +23,8 @@ double circular(double angle) {
   return std::abs(std::remainder(angle, 2 * kPi));
 }
 
-// acos(1 - h) for h in [0, 2], by Abramowitz and Stegun 4.4.46 (absolute error 2e-8, plus rounding): written
-// out because the compiler makes a vector loop of it.
+// acos(1 - h) for h in [0, 2], by Abramowitz and Stegun 4.4.46 (absolute error 2e-8, plus
+// rounding): written out because the compiler makes a vector loop of it.
 inline float angle_of(float h) {
   const float x = std::abs(1 - h);
   float p = -0.0012624911F;
@@ -48,10 +49,12 @@ ExactSignedDistance::ExactSignedDistance(SphericalMap map) : map_(std::move(map)
     for (int column = 0; column < n; ++column) {
       const int previous = column == 0 ? n - 1 : column - 1;
       if (map_.open(row, column) != map_.open(row, previous)) {
-        sides_.push_back({false, column * grid.column_step(), row * grid.row_step(), (row + 1) * grid.row_step()});
+        sides_.push_back({false, column * grid.column_step(), row * grid.row_step(),
+                          (row + 1) * grid.row_step()});
       }
       if (row > 0 && map_.open(row, column) != map_.open(row - 1, column)) {
-        sides_.push_back({true, row * grid.row_step(), column * grid.column_step(), (column + 1) * grid.column_step()});
+        sides_.push_back({true, row * grid.row_step(), column * grid.column_step(),
+                          (column + 1) * grid.column_step()});
       }
     }
   }
@@ -68,13 +71,15 @@ double ExactSignedDistance::operator()(const Vec3d& direction) const {
     if (side.along_parallel) {
       // The nearer in azimuth, the nearer on the sphere.
       const double middle = 0.5 * (side.begin + side.end);
-      const double outside = std::max(circular(azimuth - middle) - 0.5 * (side.end - side.begin), 0.0);
+      const double outside =
+          std::max(circular(azimuth - middle) - 0.5 * (side.end - side.begin), 0.0);
       nearest = std::min(nearest, squared_chord(polar, side.fixed, outside));
     } else {
       // The nearer to the foot of the perpendicular, the nearer on the sphere.
       const double between = azimuth - side.fixed;
       const double foot = std::atan2(std::sin(polar) * std::cos(between), std::cos(polar));
-      const double nearer_end = circular(foot - side.begin) < circular(foot - side.end) ? side.begin : side.end;
+      const double nearer_end =
+          circular(foot - side.begin) < circular(foot - side.end) ? side.begin : side.end;
       const double at = foot > side.begin && foot < side.end ? foot : nearer_end;
       nearest = std::min(nearest, squared_chord(polar, at, between));
     }
@@ -88,8 +93,8 @@ SignedDistanceTransform::SignedDistanceTransform(int resolution) : grid_(resolut
     const double s = std::sin(0.5 * angle);
     return 2 * s * s;
   };
-  // Meridian b lies (b - c - 1/2) columns from the centre of column c; it has a foot where that is below a
-  // quarter turn.
+  // Meridian b lies (b - c - 1/2) columns from the centre of column c; it has a foot where that is
+  // below a quarter turn.
   foot_offsets_ = (n + 1) / 4;
   for (int row = 0; row < n; ++row) {
     const double polar = (row + 0.5) * grid_.row_step();
@@ -120,7 +125,8 @@ void SignedDistanceTransform::operator()(const SphericalMap& map, float* distanc
     for (int column = 0; column < n; ++column, ++i) open[i] = map.open(row, column) ? 1 : 0;
   }
 
-  // Meridian sides as 0 or kFar, [row][meridian], each row continued past both ends so that it need not wrap.
+  // Meridian sides as 0 or kFar, [row][meridian], each row continued past both ends so that it need
+  // not wrap.
   const std::size_t margin = static_cast<std::size_t>(foot_offsets_);
   const std::size_t padded = un + 2 * margin + 1;
   std::vector<float> meridian_side(un * padded);
@@ -186,7 +192,8 @@ void SignedDistanceTransform::operator()(const SphericalMap& map, float* distanc
   }
 
   std::fill(distance, distance + un * un, kFar);
-  // Blocks of columns that keep all parallels in the first-level cache and one row's minimum in registers.
+  // Blocks of columns that keep all parallels in the first-level cache and one row's minimum in
+  // registers.
   constexpr std::size_t kBlock = 32;
   for (std::size_t begin = 0; begin < un; begin += kBlock) {
     const std::size_t width = std::min(kBlock, un - begin);
@@ -198,9 +205,11 @@ void SignedDistanceTransform::operator()(const SphericalMap& map, float* distanc
         const float product = product_[row * (un + 1) + parallels[i]];
         const float* const azimuth = &nearest_azimuth[i * un + begin];
         if (width == kBlock) {
-          for (std::size_t c = 0; c < kBlock; ++c) nearest[c] = std::min(nearest[c], polar + product * azimuth[c]);
+          for (std::size_t c = 0; c < kBlock; ++c)
+            nearest[c] = std::min(nearest[c], polar + product * azimuth[c]);
         } else {
-          for (std::size_t c = 0; c < width; ++c) nearest[c] = std::min(nearest[c], polar + product * azimuth[c]);
+          for (std::size_t c = 0; c < width; ++c)
+            nearest[c] = std::min(nearest[c], polar + product * azimuth[c]);
         }
       }
       std::copy(nearest, nearest + width, distance + row * un + begin);
@@ -216,7 +225,8 @@ void SignedDistanceTransform::operator()(const SphericalMap& map, float* distanc
       // Meridians on either side of column c: c - offset and c + 1 + offset.
       const float* const left = &meridian_side[foot_row * padded + margin - offset];
       const float* const right = &meridian_side[foot_row * padded + margin + 1 + offset];
-      for (std::size_t c = 0; c < un; ++c) nearest[c] = std::min(nearest[c], foot + std::min(left[c], right[c]));
+      for (std::size_t c = 0; c < un; ++c)
+        nearest[c] = std::min(nearest[c], foot + std::min(left[c], right[c]));
     }
     const std::uint8_t* const cells = &open[row * un];
     for (std::size_t c = 0; c < un; ++c) {

@@ -1,12 +1,14 @@
 #ifndef HEDDLE_FIBERS_MATH_SIGNED_DISTANCE_H_
 #define HEDDLE_FIBERS_MATH_SIGNED_DISTANCE_H_
-// Signed geodesic distance on the sphere, in radians, from a direction to the nearest edge between open and closed cells of
-// a lat-long map: positive where the map is open, negative where it is closed, +pi or -pi if all cells are alike.
+// Signed geodesic distance on the sphere, in radians, from a direction to the nearest edge between
+// open and closed cells of a lat-long map: positive where the map is open, negative where it is
+// closed, +pi or -pi if all cells are alike.
 //
-// Wang et al. 2009 and Khungurn 2017, section 4.1, measure to the nearest opposite cell *centre*, which is biased outward
-// by half a cell and, near the poles, by up to 2 degrees; here it is the distance to the edge itself.
-// Any way from a cell to an opposite one crosses a side shared by two cells that differ, so the edge is the union of
-// those sides: arcs of parallels and of meridians. Tested in tests/math/signed_distance_test.cpp.
+// Wang et al. 2009 and Khungurn 2017, section 4.1, measure to the nearest opposite cell *centre*,
+// which is biased outward by half a cell and, near the poles, by up to 2 degrees; here it is the
+// distance to the edge itself. Any way from a cell to an opposite one crosses a side shared by two
+// cells that differ, so the edge is the union of those sides: arcs of parallels and of meridians.
+// Tested in tests/math/signed_distance_test.cpp.
 
 #include <cstdint>
 #include <vector>
@@ -34,12 +36,13 @@ class ExactSignedDistance {
   std::vector<Side> sides_;
 };
 
-/// Fast, at all cell centres. On one parallel the distance grows with the azimuth between, so one scan per parallel finds
-/// the nearest corner or side of each column, and the minimum over parallels is a vector loop without branches; the feet
-/// of perpendiculars on meridian sides, which no corner stands for, are searched by rising distance. Nothing is left out:
-/// the result differs from ExactSignedDistance by float rounding only. Distances are compared as h = 1 - cos d, with a
-/// rounding error below 3e-7 of its value, so the error is below 3e-7 tan(d / 2) and, near the antipode, below sqrt(6e-7);
-/// the inverse cosine adds 2e-7.
+/// Fast, at all cell centres. On one parallel the distance grows with the azimuth between, so one
+/// scan per parallel finds the nearest corner or side of each column, and the minimum over
+/// parallels is a vector loop without branches; the feet of perpendiculars on meridian sides, which
+/// no corner stands for, are searched by rising distance. Nothing is left out: the result differs
+/// from ExactSignedDistance by float rounding only. Distances are compared as h = 1 - cos d, with a
+/// rounding error below 3e-7 of its value, so the error is below 3e-7 tan(d / 2) and, near the
+/// antipode, below sqrt(6e-7); the inverse cosine adds 2e-7.
 class SignedDistanceTransform {
  public:
   static constexpr double kMaxError = 5e-6;              // radians, for distances up to 3
@@ -55,9 +58,11 @@ class SignedDistanceTransform {
   std::vector<float> polar_;    // [row][parallel] 1 - cos(polar angle between)
   std::vector<float> product_;  // [row][parallel] sin * sin
   std::vector<float> azimuth_;  // [half columns] 1 - cos(azimuth)
-  std::vector<float> foot_;     // [row][column offset] 1 - cos(distance to the foot on the meridian)
-  std::vector<int> foot_row_;   // [row][column offset] row of the foot
-  int foot_offsets_;            // meridians on either side, nearer than a quarter turn, that have a foot
+  // [row][column offset] 1 - cos(distance to the foot on the meridian)
+  std::vector<float> foot_;
+  std::vector<int> foot_row_;  // [row][column offset] row of the foot
+  // meridians on either side, nearer than a quarter turn, that have a foot
+  int foot_offsets_;
 };
 
 }  // namespace heddle

@@ -10,9 +10,9 @@
 namespace heddle {
 namespace {
 
-// Ratios of successive Bessel functions, r_n = I_{n + shift} / I_{n - 1 + shift} = x / (2 (n + shift) + x
-// r_{n+1}), downward from an order so high that the error of the start has died out (it shrinks by r^2 in
-// each step, and 1 - r_n is about n / x for large x, so 8 sqrt(x) steps suffice).
+// Ratios of successive Bessel functions, r_n = I_{n + shift} / I_{n - 1 + shift} = x / (2 (n +
+// shift) + x r_{n+1}), downward from an order so high that the error of the start has died out (it
+// shrinks by r^2 in each step, and 1 - r_n is about n / x for large x, so 8 sqrt(x) steps suffice).
 std::vector<double> ratios_by_downward_recurrence(int order, double x, double shift) {
   const int start = order + 30 + static_cast<int>(std::ceil(8.0 * std::sqrt(x)));
   double ratio = x / (2.0 * (start + shift) + x);
@@ -29,8 +29,8 @@ std::vector<double> ratios_by_downward_recurrence(int order, double x, double sh
 
 double scaled_bessel_i0(double x) {
   assert(x >= 0.0 && "I0 is even: pass |x|");
-  // From 20 on the asymptotic series has terms below 1e-17 before it diverges (its smallest is about exp(-2
-  // x)).
+  // From 20 on the asymptotic series has terms below 1e-17 before it diverges (its smallest is
+  // about exp(-2 x)).
   if (x < 20.0) {
     const double quarter = 0.25 * x * x;
     double term = 1.0;
@@ -54,9 +54,9 @@ float scaled_bessel_i0(float x) {
   if (x < 3.75F) {
     const float t = x * x * (1.0F / 14.0625F);
     const float i0 =
-        1.0F +
-        t * (3.5156229F +
-             t * (3.0899424F + t * (1.2067492F + t * (0.2659732F + t * (0.0360768F + t * 0.0045813F)))));
+        1.0F + t * (3.5156229F +
+                    t * (3.0899424F +
+                         t * (1.2067492F + t * (0.2659732F + t * (0.0360768F + t * 0.0045813F)))));
     return i0 * std::exp(-x);
   }
   const float t = 3.75F / x;
@@ -66,7 +66,8 @@ float scaled_bessel_i0(float x) {
            t * (0.00225319F +
                 t * (-0.00157565F +
                      t * (0.00916281F +
-                          t * (-0.02057706F + t * (0.02635537F + t * (-0.01647633F + t * 0.00392377F)))))));
+                          t * (-0.02057706F +
+                               t * (0.02635537F + t * (-0.01647633F + t * 0.00392377F)))))));
   return series / std::sqrt(x);
 }
 
@@ -77,10 +78,11 @@ std::vector<double> bessel_ratios(int order, double x) {
 
 std::vector<double> spherical_bessel_ratios(int order, double x) {
   assert(order >= 0 && order <= 10 && x >= 0.0);
-  // Below 500 the finite sum cancels more and more; above it its terms fall by a factor of 9 or more at
-  // order 10.
+  // Below 500 the finite sum cancels more and more; above it its terms fall by a factor of 9 or
+  // more at order 10.
   if (x < 500.0) return ratios_by_downward_recurrence(order, x, 0.5);
-  // i_l(x) = exp(x) / (2 x) * sum_k (-1)^k (l + k)! / (k! (l - k)! (2 x)^k), exp(-2 x) being 0 here.
+  // i_l(x) = exp(x) / (2 x) * sum_k (-1)^k (l + k)! / (k! (l - k)! (2 x)^k), exp(-2 x) being 0
+  // here.
   std::vector<double> ratios(static_cast<std::size_t>(order) + 1);
   for (int l = 0; l <= order; ++l) {
     double term = 1.0;
@@ -108,7 +110,8 @@ float erf_difference(float a, float b) {
 
 double gaussian_cos2_mean(double mu, double beta) {
   assert(beta > 0.0 && std::abs(mu) <= 0.5 * kPi + 1e-9);
-  // 8.8 standard deviations leave 1e-18 of the Gaussian; 40 nodes integrate it on that range to 1e-16.
+  // 8.8 standard deviations leave 1e-18 of the Gaussian; 40 nodes integrate it on that range to
+  // 1e-16.
   const double reach = 8.8 * beta;
   const double a = std::max(-0.5 * kPi, mu - reach);
   const double b = std::min(0.5 * kPi, mu + reach);

@@ -1,10 +1,11 @@
 #ifndef HEDDLE_FIBERS_MATH_SPHERICAL_GAUSSIAN_H_
 #define HEDDLE_FIBERS_MATH_SPHERICAL_GAUSSIAN_H_
-// Spherical Gaussians G(w; axis, sharpness) = exp(sharpness (w . axis - 1)): value 1 on the axis, not
-// normalised.
+// Spherical Gaussians G(w; axis, sharpness) = exp(sharpness (w . axis - 1)): value 1 on the axis,
+// not normalised.
 //
-// Evaluated as exp(-sharpness |w - axis|^2 / 2), which does not cancel at high sharpness. Sharpness >= 0; 0
-// is the constant 1. Khungurn 2017, section 4. Tested in tests/math/spherical_gaussian_test.cpp.
+// Evaluated as exp(-sharpness |w - axis|^2 / 2), which does not cancel at high sharpness. Sharpness
+// >= 0; 0 is the constant 1. Khungurn 2017, section 4. Tested in
+// tests/math/spherical_gaussian_test.cpp.
 
 #include <vector>
 
@@ -32,8 +33,9 @@ struct SgProduct {
 /// Where the two cancel (opposite axes, equal sharpness) the axis is a's.
 SgProduct sg_product(const SphericalGaussian& a, const SphericalGaussian& b);
 
-/// [order + 1] coefficients of Y(l, 0) of the *normalised* Gaussian G / mass about +z: sqrt((2 l + 1) / 4 pi)
-/// A_l. About another axis the coefficients are A_l Y_lm(axis), with A_l of spherical_bessel_ratios.
+/// [order + 1] coefficients of Y(l, 0) of the *normalised* Gaussian G / mass about +z: sqrt((2 l +
+/// 1) / 4 pi) A_l. About another axis the coefficients are A_l Y_lm(axis), with A_l of
+/// spherical_bessel_ratios.
 std::vector<double> sg_zonal(int order, double sharpness);
 
 }  // namespace heddle

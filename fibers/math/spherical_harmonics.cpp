@@ -28,12 +28,13 @@ struct LegendreTable {
     }
     for (int m = 0; m < kBands; ++m) {
       for (int l = m + 1; l < kBands; ++l) {
-        const double up =
-            std::sqrt((4.0 * l * l - 1.0) / (static_cast<double>(l) * l - static_cast<double>(m) * m));
+        const double up = std::sqrt((4.0 * l * l - 1.0) /
+                                    (static_cast<double>(l) * l - static_cast<double>(m) * m));
         const double k = l - 1.0;
         rise[l][m] = static_cast<T>(up);
-        fall[l][m] =
-            l == m + 1 ? T(0) : static_cast<T>(up * std::sqrt((k * k - m * m) / (4.0 * k * k - 1.0)));
+        fall[l][m] = l == m + 1
+                         ? T(0)
+                         : static_cast<T>(up * std::sqrt((k * k - m * m) / (4.0 * k * k - 1.0)));
       }
     }
   }

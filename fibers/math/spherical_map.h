@@ -1,10 +1,11 @@
 #ifndef HEDDLE_FIBERS_MATH_SPHERICAL_MAP_H_
 #define HEDDLE_FIBERS_MATH_SPHERICAL_MAP_H_
-// Binary function on the sphere, constant on the cells of a lat-long grid, as packed bits: which directions are open.
+// Binary function on the sphere, constant on the cells of a lat-long grid, as packed bits: which
+// directions are open.
 //
-// N x N cells: row r holds polar angles from pi r / N to pi (r + 1) / N measured from +z, column c azimuths atan2(y, x) in
-// [2 pi c / N, 2 pi (c + 1) / N). Cell (r, c) is bit r N + c, least significant bit of each word first.
-// Tested in tests/math/spherical_map_test.cpp.
+// N x N cells: row r holds polar angles from pi r / N to pi (r + 1) / N measured from +z, column c
+// azimuths atan2(y, x) in [2 pi c / N, 2 pi (c + 1) / N). Cell (r, c) is bit r N + c, least
+// significant bit of each word first. Tested in tests/math/spherical_map_test.cpp.
 
 #include <algorithm>
 #include <cassert>
@@ -46,7 +47,8 @@ class LatLongGrid {
   Vec3d centre(int row, int column) const {
     const double polar = (row + 0.5) * row_step();
     const double azimuth = (column + 0.5) * column_step();
-    return {std::sin(polar) * std::cos(azimuth), std::sin(polar) * std::sin(azimuth), std::cos(polar)};
+    return {std::sin(polar) * std::cos(azimuth), std::sin(polar) * std::sin(azimuth),
+            std::cos(polar)};
   }
 
   /// Steradians of any cell of a row: column_step (cos a - cos b), written without cancellation.
@@ -89,7 +91,9 @@ class SphericalMap {
   }
 
  private:
-  std::size_t index(int row, int column) const { return static_cast<std::size_t>(row) * grid_.resolution() + column; }
+  std::size_t index(int row, int column) const {
+    return static_cast<std::size_t>(row) * grid_.resolution() + column;
+  }
   LatLongGrid grid_;
   std::vector<std::uint64_t> words_;
 };

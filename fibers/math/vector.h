@@ -1,7 +1,7 @@
 #ifndef HEDDLE_FIBERS_MATH_VECTOR_H_
 #define HEDDLE_FIBERS_MATH_VECTOR_H_
-// The small vector types used everywhere. Positions are millimetres, directions unit vectors that point away from
-// the point being shaded, colours linear Rec.709.
+// The small vector types used everywhere. Positions are millimetres, directions unit vectors that
+// point away from the point being shaded, colours linear Rec.709.
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
@@ -19,8 +19,12 @@ using Rgbd = Eigen::Array3d;
 inline constexpr double kPi = 3.14159265358979323846;
 inline constexpr float kPif = 3.14159265358979323846F;
 
-constexpr double radians(double degrees) { return degrees * (kPi / 180.0); }
-constexpr double degrees(double radians) { return radians * (180.0 / kPi); }
+constexpr double radians(double degrees) {
+  return degrees * (kPi / 180.0);
+}
+constexpr double degrees(double radians) {
+  return radians * (180.0 / kPi);
+}
 
 }  // namespace heddle
 

@@ -15,7 +15,8 @@ namespace {
 
 constexpr float kHalfPi = 0.5F * kPif;
 constexpr int kEndRows = 512;
-constexpr double kEndReach = 6.5;  // deviations from an end beyond which the cut leaves Gn as it is (to 1e-10)
+// deviations from an end beyond which the cut leaves Gn as it is (to 1e-10)
+constexpr double kEndReach = 6.5;
 
 // I0(x) exp(-x) sqrt(1 + 2 pi x) over t = x / (x + 2): between 0.9 and 1.1 everywhere, so linear
 // interpolation keeps 1e-6.
@@ -25,7 +26,8 @@ class BesselTable {
     for (int k = 0; k < kEntries; ++k) {
       const double t = static_cast<double>(k) / kEntries;
       const double x = 2.0 * t / (1.0 - t);
-      values_[static_cast<std::size_t>(k)] = static_cast<float>(scaled_bessel_i0(x) * std::sqrt(1.0 + 2.0 * kPi * x));
+      values_[static_cast<std::size_t>(k)] =
+          static_cast<float>(scaled_bessel_i0(x) * std::sqrt(1.0 + 2.0 * kPi * x));
     }
     values_[kEntries] = values_[kEntries + 1] = 1.0F;
   }
@@ -66,8 +68,8 @@ float schlick_weight(float sine, float cosine) {
 
 }  // namespace
 
-// A direction taken apart. Near an end the angle comes from the cosine, so that its distance from the end is
-// accurate.
+// A direction taken apart. Near an end the angle comes from the cosine, so that its distance from
+// the end is accurate.
 struct BcsdfTable::Inclination {
   float theta;
   float from_end;  // pi/2 - |theta|
@@ -75,7 +77,8 @@ struct BcsdfTable::Inclination {
   float sine;
   Vec2 azimuth;  // unit; (1, 0) along the tangent
 
-  explicit Inclination(const Vec3& w) : cosine(std::sqrt(w.y() * w.y() + w.z() * w.z())), sine(w.x()) {
+  explicit Inclination(const Vec3& w)
+      : cosine(std::sqrt(w.y() * w.y() + w.z() * w.z())), sine(w.x()) {
     if (cosine < 0.7F) {
       from_end = std::asin(cosine);
       theta = std::copysign(kHalfPi - from_end, w.x());
@@ -102,7 +105,8 @@ struct BcsdfTable::Densities {
 
 struct BcsdfTable::SgSums {
   std::array<Rgb, 2> value = {Rgb::Zero(), Rgb::Zero()};  // R's and TT's share of Gamma
-  std::array<float, 2> theta_shift = {};                  // mean inclination of what they scatter, from the axis's
+  // mean inclination of what they scatter, from the axis's
+  std::array<float, 2> theta_shift = {};
 };
 
 float BcsdfTable::LongitudinalLobe::cos2_mean(float cosine, float from_end) const {
@@ -129,8 +133,8 @@ BcsdfTable::LongitudinalLobe BcsdfTable::longitudinal_lobe(double beta) {
   for (int k = 0; k <= kEndRows; ++k) {
     const double from_end = reach * k / kEndRows;
     const double cosine = std::sin(from_end);
-    lobe.end_ratio[static_cast<std::size_t>(k)] =
-        static_cast<float>(gaussian_cos2_mean(0.5 * kPi - from_end, beta) / (floor + decay * cosine * cosine));
+    lobe.end_ratio[static_cast<std::size_t>(k)] = static_cast<float>(
+        gaussian_cos2_mean(0.5 * kPi - from_end, beta) / (floor + decay * cosine * cosine));
   }
   return lobe;
 }
@@ -157,16 +161,18 @@ BcsdfTable::BcsdfTable(const FiberScattering& fiber)
     const std::vector<Rgbd> r = bcsdf_sh(fiber, theta_o, kMaxOrder, Lobe::kR);
     const std::vector<Rgbd> tt = bcsdf_sh(fiber, theta_o, kMaxOrder, Lobe::kTt);
     const int mirrored = kRows - 1 - row;
-    // Turning theta_o and theta_i about mirrors x, under which harmonics with cos(m phi) change by (-1)^m and
-    // those with sin(m phi) by -(-1)^m.
+    // Turning theta_o and theta_i about mirrors x, under which harmonics with cos(m phi) change by
+    // (-1)^m and those with sin(m phi) by -(-1)^m.
     for (int l = 0; l <= kMaxOrder; ++l) {
       for (int m = -l; m <= l; ++m) {
         const auto j = static_cast<std::size_t>(l * (l + 1) + m);
         const float sign = (m % 2 == 0) == (m >= 0) ? 1.0F : -1.0F;
         for (int c = 0; c < 3; ++c) {
           const auto value = static_cast<float>(r[j][c] + tt[j][c]);
-          sh_[(static_cast<std::size_t>(row) * kCount + j) * 3 + static_cast<std::size_t>(c)] = value;
-          sh_[(static_cast<std::size_t>(mirrored) * kCount + j) * 3 + static_cast<std::size_t>(c)] = sign * value;
+          sh_[(static_cast<std::size_t>(row) * kCount + j) * 3 + static_cast<std::size_t>(c)] =
+              value;
+          sh_[(static_cast<std::size_t>(mirrored) * kCount + j) * 3 + static_cast<std::size_t>(c)] =
+              sign * value;
         }
       }
     }
@@ -193,7 +199,8 @@ BcsdfTable::Densities BcsdfTable::densities(const Inclination& in, const Inclina
   const float half_square = -0.5F * deviation * deviation;
   return {r_.norm * std::exp(half_square * r_.inverse_variance) * (0.5F / kPif),
           tt_.norm * azimuth_norm_ *
-              std::exp(half_square * tt_.inverse_variance - 0.5F * k_ * (in.azimuth + out.azimuth).squaredNorm())};
+              std::exp(half_square * tt_.inverse_variance -
+                       0.5F * k_ * (in.azimuth + out.azimuth).squaredNorm())};
 }
 
 Rgb BcsdfTable::value(const Densities& d, const Inclination& in) const {
@@ -203,10 +210,13 @@ Rgb BcsdfTable::value(const Densities& d, const Inclination& in) const {
   return color_r_ * r + (1.0F - color_r_) * (schlick * r + (1.0F - schlick) * tt * color_tt_);
 }
 
-float BcsdfTable::sampling_density(const Densities& d, const Inclination& out, float probability_of_r) const {
-  // Share of the Gaussian about -theta_o inside [-pi/2, pi/2]; five deviations from the ends it is 1 to 3e-7.
+float BcsdfTable::sampling_density(const Densities& d, const Inclination& out,
+                                   float probability_of_r) const {
+  // Share of the Gaussian about -theta_o inside [-pi/2, pi/2]; five deviations from the ends it is
+  // 1 to 3e-7.
   const float mass_r = out.from_end < 5.0F * r_.beta ? cut_gaussian_mass(out.theta, r_.beta) : 1.0F;
-  const float mass_tt = out.from_end < 5.0F * tt_.beta ? cut_gaussian_mass(out.theta, tt_.beta) : 1.0F;
+  const float mass_tt =
+      out.from_end < 5.0F * tt_.beta ? cut_gaussian_mass(out.theta, tt_.beta) : 1.0F;
   return probability_of_r / mass_r * d.r + (1.0F - probability_of_r) / mass_tt * d.tt;
 }
 
@@ -220,19 +230,22 @@ float BcsdfTable::pdf(const Vec3& wi, const Vec3& wo, const Rgb& importance) con
   const Inclination in(wi);
   if (fiber_.isotropic_white) return in.cosine / (kPif * kPif);
   const Inclination out(wo);
-  // Exactly along the tangent the density is infinite: capped at the cosine that float can tell from 0.
+  // Exactly along the tangent the density is infinite: capped at the cosine that float can tell
+  // from 0.
   return sampling_density(densities(in, out), out, probability_of_r(out.theta, importance)) /
          std::max(in.cosine, 1e-7F);
 }
 
-BcsdfTable::Sample BcsdfTable::sample(const Vec3& wo, RandomStream& random, const Rgb& importance) const {
+BcsdfTable::Sample BcsdfTable::sample(const Vec3& wo, RandomStream& random,
+                                      const Rgb& importance) const {
   if (fiber_.isotropic_white) {
-    // Density cos(theta) / pi^2: x has that of a coordinate of a uniform point in the disk, the azimuth is
-    // uniform.
+    // Density cos(theta) / pi^2: x has that of a coordinate of a uniform point in the disk, the
+    // azimuth is uniform.
     const float x = sample_disk(random).x();
     const float phi = 2.0F * kPif * random.uniform();
     const float cosine = std::sqrt(std::max(0.0F, 1.0F - x * x));
-    return {Vec3(x, cosine * std::cos(phi), cosine * std::sin(phi)), Rgb::Ones(), cosine / (kPif * kPif), kPif};
+    return {Vec3(x, cosine * std::cos(phi), cosine * std::sin(phi)), Rgb::Ones(),
+            cosine / (kPif * kPif), kPif};
   }
   const Inclination out(wo);
   const float probability = probability_of_r(out.theta, importance);
@@ -246,9 +259,11 @@ BcsdfTable::Sample BcsdfTable::sample(const Vec3& wo, RandomStream& random, cons
                                    sin_turn * out.azimuth.x() + cos_turn * out.azimuth.y()));
   const Densities d = densities(in, out);
   const float density =
-      sampling_density(d, out, probability);  // per d theta_i d phi_i, so pdf = density / cos(theta_i)
+      // per d theta_i d phi_i, so pdf = density / cos(theta_i)
+      sampling_density(d, out, probability);
   return {Vec3(in.sine, in.cosine * in.azimuth.x(), in.cosine * in.azimuth.y()),
-          value(d, in) * (in.cosine * in.cosine / density), density / in.cosine, is_r ? r_.beta : tt_.beta};
+          value(d, in) * (in.cosine * in.cosine / density), density / in.cosine,
+          is_r ? r_.beta : tt_.beta};
 }
 
 Rgb BcsdfTable::sg_scatter(const Vec3& axis, float sharpness, const Vec3& wo) const {
@@ -256,7 +271,8 @@ Rgb BcsdfTable::sg_scatter(const Vec3& axis, float sharpness, const Vec3& wo) co
   return sums.value[0] + sums.value[1];
 }
 
-std::array<BcsdfTable::LobeResponse, 2> BcsdfTable::sg_scatter_by_lobe(const Vec3& axis, float sharpness,
+std::array<BcsdfTable::LobeResponse, 2> BcsdfTable::sg_scatter_by_lobe(const Vec3& axis,
+                                                                       float sharpness,
                                                                        const Vec3& wo) const {
   const Inclination light(axis);
   const Inclination view(wo);
@@ -265,23 +281,27 @@ std::array<BcsdfTable::LobeResponse, 2> BcsdfTable::sg_scatter_by_lobe(const Vec
   for (std::size_t n = 0; n < 2; ++n) {
     const bool is_r = n == 0;
     const float cosine = std::max(0.0F, std::cos(light.theta + sums.theta_shift[n]));
-    // Von Mises of light, about its azimuth, times that of TT, about the azimuth opposite to the viewer's.
+    // Von Mises of light, about its azimuth, times that of TT, about the azimuth opposite to the
+    // viewer's.
     const Vec2 from_light = (sharpness * light.cosine * cosine) * light.azimuth;
     const Vec2 mean = is_r ? from_light : Vec2(from_light - k_ * view.azimuth);
     lobes[n] = {sums.value[n], sums.theta_shift[n],
-                std::atan2(light.azimuth.x() * mean.y() - light.azimuth.y() * mean.x(), light.azimuth.dot(mean)),
+                std::atan2(light.azimuth.x() * mean.y() - light.azimuth.y() * mean.x(),
+                           light.azimuth.dot(mean)),
                 sharpness + (is_r ? r_.inverse_variance : tt_.inverse_variance), mean.norm()};
   }
   return lobes;
 }
 
-BcsdfTable::SgSums BcsdfTable::sg_sums(const Inclination& light, float sharpness, const Inclination& view) const {
+BcsdfTable::SgSums BcsdfTable::sg_sums(const Inclination& light, float sharpness,
+                                       const Inclination& view) const {
   constexpr int kLanes = 8;
   constexpr int kMaxNodes = 2 * kBroadNodes;
   using Lanes = Eigen::Array<float, kLanes, 1>;
   const float gap = -view.theta - light.theta;  // from theta' to the cone
 
-  // Nodes of both lobes, R's first. E is kept relative to the lobe's centre, where angles are small.
+  // Nodes of both lobes, R's first. E is kept relative to the lobe's centre, where angles are
+  // small.
   std::array<float, kMaxNodes> from_light;  // theta - theta'
   std::array<float, kMaxNodes> from_cone;   // theta + theta_o
   std::array<float, kMaxNodes> weight;
@@ -303,7 +323,8 @@ BcsdfTable::SgSums BcsdfTable::sg_sums(const Inclination& light, float sharpness
       static const QuadratureRule& base = gauss_legendre(kBroadNodes);
       for (std::size_t n = 0; n < base.nodes.size(); ++n) {
         const float theta = kHalfPi * static_cast<float>(base.nodes[n]);
-        add_node(theta - light.theta, theta + view.theta, kHalfPi * static_cast<float>(base.weights[n]), 0.0F);
+        add_node(theta - light.theta, theta + view.theta,
+                 kHalfPi * static_cast<float>(base.weights[n]), 0.0F);
       }
       return;
     }
@@ -316,7 +337,8 @@ BcsdfTable::SgSums BcsdfTable::sg_sums(const Inclination& light, float sharpness
     const ThreeNodeRule rule = cut_rule(static_cast<double>(root * (kHalfPi - std::abs(centre))));
     for (std::size_t n = 0; n < 3; ++n) {
       const auto x = static_cast<float>(rule.nodes[n]);
-      add_node(light_offset + scale * x, cone_offset + scale * x, static_cast<float>(rule.weights[n]) / root, x * x);
+      add_node(light_offset + scale * x, cone_offset + scale * x,
+               static_cast<float>(rule.weights[n]) / root, x * x);
     }
   };
   add_lobe(r_.inverse_variance);
@@ -351,7 +373,8 @@ BcsdfTable::SgSums BcsdfTable::sg_sums(const Inclination& light, float sharpness
     // B as in sg_scatter.cpp; with k = 0 TT's azimuth integral becomes R's.
     const Lanes a = (sharpness * light.cosine) * cosine;
     const Lanes m = ((k - a).square() + difference2 * k * a).sqrt();
-    const Lanes exponent = x2 - 0.5F * inverse_variance * d_cone.square() - 2.0F * sharpness * half_sine.square() -
+    const Lanes exponent = x2 - 0.5F * inverse_variance * d_cone.square() -
+                           2.0F * sharpness * half_sine.square() -
                            sum2 * k * a / (m + a + k).max(1e-30F);
     const Lanes t = m / (m + 2.0F);
     const Lanes value = exponent.exp() * cosine.square() / (1.0F + 2.0F * kPif * m).sqrt();
@@ -390,8 +413,8 @@ BcsdfTable::SgSums BcsdfTable::sg_sums(const Inclination& light, float sharpness
   return sums;
 }
 
-Rgb BcsdfTable::blurred_scatter(const Lanes& theta_i, const Lanes& cos_turn, float theta_o, float variance,
-                                const RgbLanes& light) const {
+Rgb BcsdfTable::blurred_scatter(const Lanes& theta_i, const Lanes& cos_turn, float theta_o,
+                                float variance, const RgbLanes& light) const {
   if (fiber_.isotropic_white) {
     // S = 1 / pi^2, and the mean of the cosine over the Gaussian.
     const Lanes response = theta_i.cos() * (std::exp(-0.5F * variance) / (kPif * kPif));
@@ -405,7 +428,8 @@ Rgb BcsdfTable::blurred_scatter(const Lanes& theta_i, const Lanes& cos_turn, flo
     const Lanes cosine = theta.cos().max(0.0F);
     const Lanes drop = 1.0F - cosine;
     schlick = drop.square().square() * drop;
-    Lanes response = (from_cone.square() * (-0.5F / total)).exp() * cosine * (1 / std::sqrt(2 * kPif * total));
+    Lanes response =
+        (from_cone.square() * (-0.5F / total)).exp() * cosine * (1 / std::sqrt(2 * kPif * total));
     for (int lane = 0; lane < Lanes::SizeAtCompileTime; ++lane) {
       response[lane] /= lobe.cos2_mean(cosine[lane], kHalfPi - std::abs(theta[lane]));
     }
@@ -415,8 +439,11 @@ Rgb BcsdfTable::blurred_scatter(const Lanes& theta_i, const Lanes& cos_turn, flo
   Lanes schlick_tt;
   const Lanes r = lobe_response(r_, schlick_r) * (0.5F / kPif);
   const Lanes tt = lobe_response(tt_, schlick_tt) * azimuth_norm_ * (-k_ * (1.0F + cos_turn)).exp();
-  const auto sum = [&](const Lanes& weight) -> Rgb { return (light.colwise() * weight).colwise().sum().transpose(); };
-  return color_r_ * sum(r) + (1.0F - color_r_) * (sum(r * schlick_r) + color_tt_ * sum(tt * (1.0F - schlick_tt)));
+  const auto sum = [&](const Lanes& weight) -> Rgb {
+    return (light.colwise() * weight).colwise().sum().transpose();
+  };
+  return color_r_ * sum(r) +
+         (1.0F - color_r_) * (sum(r * schlick_r) + color_tt_ * sum(tt * (1.0F - schlick_tt)));
 }
 
 void BcsdfTable::sh_coefficients(float theta_o, int order, float* out) const {

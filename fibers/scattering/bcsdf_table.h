@@ -1,18 +1,19 @@
 #ifndef HEDDLE_FIBERS_SCATTERING_BCSDF_TABLE_H_
 #define HEDDLE_FIBERS_SCATTERING_BCSDF_TABLE_H_
-// One FiberScattering in the float form of the renderer and the path walker: value, sampling, response to
-// spherical Gaussians and to spherical harmonics. Tables sample the double-precision functions of
-// fiber_bcsdf.h and sg_scatter.h.
+// One FiberScattering in the float form of the renderer and the path walker: value, sampling,
+// response to spherical Gaussians and to spherical harmonics. Tables sample the double-precision
+// functions of fiber_bcsdf.h and sg_scatter.h.
 //
-// Fiber frame: x = tangent; all directions point away from the fiber; values are 1/sr without the cosine,
-// densities 1/sr over the whole sphere.
-// Sampling draws wi for a given wo: a lobe by the tabulated adjoint albedos (the integrals of S_R and S_TT cos(theta_i)
-// over wi), then theta_i from the lobe's Gaussian cut to [-pi/2, pi/2] and the azimuth exactly. The density is that of the
-// mixture. Albedos are weighed by `importance`, the throughput of the path so far: then the sum of the throughput's colours
-// stays almost what it was. With colours weighed alike whatever the path carries, weights of a white fiber's 30 bounces
-// vary as the product of 30 factors (throughputs in the hundreds, most of the light in few paths).
-// Worst change of that sum over the fibers and angles tested: a factor of 2.6 (hundreds when Schlick's F at theta_o chooses
-// the lobe). Building one takes about 0.1 s. Tested, with the errors and the worst weights, in
+// Fiber frame: x = tangent; all directions point away from the fiber; values are 1/sr without the
+// cosine, densities 1/sr over the whole sphere. Sampling draws wi for a given wo: a lobe by the
+// tabulated adjoint albedos (the integrals of S_R and S_TT cos(theta_i) over wi), then theta_i from
+// the lobe's Gaussian cut to [-pi/2, pi/2] and the azimuth exactly. The density is that of the
+// mixture. Albedos are weighed by `importance`, the throughput of the path so far: then the sum of
+// the throughput's colours stays almost what it was. With colours weighed alike whatever the path
+// carries, weights of a white fiber's 30 bounces vary as the product of 30 factors (throughputs in
+// the hundreds, most of the light in few paths). Worst change of that sum over the fibers and
+// angles tested: a factor of 2.6 (hundreds when Schlick's F at theta_o chooses the lobe). Building
+// one takes about 0.1 s. Tested, with the errors and the worst weights, in
 // tests/fibers/scattering/bcsdf_table_test.cpp.
 
 #include <array>
@@ -49,8 +50,9 @@ class BcsdfTable {
   /// Gamma of sg_scatter.h by SgMethod::kDefault, for a unit axis and sharpness >= 0.
   Rgb sg_scatter(const Vec3& axis, float sharpness, const Vec3& wo) const;
 
-  /// One lobe's share of Gamma, and where that light comes from: about the direction that lies `theta_shift` further in inclination
-  /// and `turn` further in azimuth than the axis, a Gaussian of the given precisions (1 / variance, radians^-2) in both.
+  /// One lobe's share of Gamma, and where that light comes from: about the direction that lies
+  /// `theta_shift` further in inclination and `turn` further in azimuth than the axis, a Gaussian
+  /// of the given precisions (1 / variance, radians^-2) in both.
   struct LobeResponse {
     Rgb value = Rgb::Zero();
     float theta_shift = 0;
@@ -59,24 +61,27 @@ class BcsdfTable {
     float azimuth_precision = 0;
   };
   /// R's share, then TT's; their values add up to sg_scatter.
-  std::array<LobeResponse, 2> sg_scatter_by_lobe(const Vec3& axis, float sharpness, const Vec3& wo) const;
+  std::array<LobeResponse, 2> sg_scatter_by_lobe(const Vec3& axis, float sharpness,
+                                                 const Vec3& wo) const;
 
   using Lanes = Eigen::Array<float, 8, 1>;
   using RgbLanes = Eigen::Array<float, 8, 3>;
-  /// Scattered towards inclination theta_o from light that is Gaussian in inclination: sum over the lanes of
-  /// light * integral of S cos(theta) N(theta; theta_i, variance) dtheta, theta_i per lane, variance > 0, cos_turn the cosine of the lane's
-  /// azimuth from wo's. The product of Gaussians is exact, the factors beside it are taken at its mean.
+  /// Scattered towards inclination theta_o from light that is Gaussian in inclination: sum over the
+  /// lanes of light * integral of S cos(theta) N(theta; theta_i, variance) dtheta, theta_i per
+  /// lane, variance > 0, cos_turn the cosine of the lane's azimuth from wo's. The product of
+  /// Gaussians is exact, the factors beside it are taken at its mean.
   Rgb blurred_scatter(const Lanes& theta_i, const Lanes& cos_turn, float theta_o, float variance,
                       const RgbLanes& light) const;
 
-  /// bcsdf_sh by linear interpolation between rows. out: [(order + 1)^2][3], order <= kMaxOrder. Error 1e-4,
-  /// but where an end of [-pi/2, pi/2] cuts a narrow lobe: 2e-3 at beta = 1 degree, 0.1 at 0.1 degrees.
+  /// bcsdf_sh by linear interpolation between rows. out: [(order + 1)^2][3], order <= kMaxOrder.
+  /// Error 1e-4, but where an end of [-pi/2, pi/2] cuts a narrow lobe: 2e-3 at beta = 1 degree, 0.1
+  /// at 0.1 degrees.
   void sh_coefficients(float theta_o, int order, float* out) const;
 
  private:
-  // One lobe's longitudinal part. Gn(theta) = (floor + decay cos^2) * end_ratio(distance from the nearer
-  // end): the first factor is the mean of cos^2 over the uncut Gaussian, the second, 1 but near the ends, is
-  // tabulated.
+  // One lobe's longitudinal part. Gn(theta) = (floor + decay cos^2) * end_ratio(distance from the
+  // nearer end): the first factor is the mean of cos^2 over the uncut Gaussian, the second, 1 but
+  // near the ends, is tabulated.
   struct LongitudinalLobe {
     float beta = 0;
     float inverse_variance = 0;
@@ -107,7 +112,8 @@ class BcsdfTable {
   float k_ = 0;             // gamma_tt^-2
   float azimuth_norm_ = 0;  // 1 / (2 pi I0(k) exp(-k))
   VonMisesSampler azimuth_sampler_;
-  std::vector<Rgb> adjoint_r_;   // [kRows] integrals of S_R cos(theta_i) over wi, up to a common factor
+  // [kRows] integrals of S_R cos(theta_i) over wi, up to a common factor
+  std::vector<Rgb> adjoint_r_;
   std::vector<Rgb> adjoint_tt_;  // [kRows] the same of S_TT
   std::vector<float> sh_;        // [kRows][(kMaxOrder + 1)^2][3]
 };

@@ -27,8 +27,8 @@ Eigen::Vector2d azimuth(const Vec3d& direction) {
                       : Eigen::Vector2d(1.0, 0.0);
 }
 
-// Nodes over [-pi/2, pi/2] for a Gaussian about `centre` times functions that change on the scale beta or
-// slower.
+// Nodes over [-pi/2, pi/2] for a Gaussian about `centre` times functions that change on the scale
+// beta or slower.
 QuadratureRule gaussian_panels(double centre, double beta) {
   const double a = std::max(-kHalfPi, centre - 9.0 * beta);
   const double b = std::min(kHalfPi, centre + 9.0 * beta);
@@ -44,7 +44,8 @@ FiberDirection fiber_direction(const Vec3d& direction) {
 
 Vec3d vector_from(const FiberDirection& direction) {
   const double cosine = std::cos(direction.theta);
-  return {std::sin(direction.theta), cosine * std::cos(direction.phi), cosine * std::sin(direction.phi)};
+  return {std::sin(direction.theta), cosine * std::cos(direction.phi),
+          cosine * std::sin(direction.phi)};
 }
 
 double schlick_weight(double cos_theta) {
@@ -59,7 +60,8 @@ double longitudinal_weight(double theta_i, double beta) {
 
 Rgbd colored(const FiberScattering& fiber, const LobeSums& sums) {
   if (fiber.isotropic_white) return Rgbd::Constant(sums.r);
-  return fiber.color_r * sums.r + (1.0 - fiber.color_r) * (sums.r_schlick + fiber.color_tt * sums.tt);
+  return fiber.color_r * sums.r +
+         (1.0 - fiber.color_r) * (sums.r_schlick + fiber.color_tt * sums.tt);
 }
 
 Rgbd evaluate_bcsdf(const FiberScattering& fiber, const Vec3d& wi, const Vec3d& wo, Lobe lobe) {
@@ -78,8 +80,8 @@ Rgbd evaluate_bcsdf(const FiberScattering& fiber, const Vec3d& wi, const Vec3d& 
   if (lobe != Lobe::kR) {
     const double k = 1.0 / (fiber.gamma_tt * fiber.gamma_tt);
     // 2 cos^2(d / 2) = |u_i + u_o|^2 / 2 does not cancel near the peak d = pi.
-    const double von_mises =
-        std::exp(-0.5 * k * (azimuth(wi) + azimuth(wo)).squaredNorm()) / (2.0 * kPi * scaled_bessel_i0(k));
+    const double von_mises = std::exp(-0.5 * k * (azimuth(wi) + azimuth(wo)).squaredNorm()) /
+                             (2.0 * kPi * scaled_bessel_i0(k));
     density.tt = (1.0 - schlick) * longitudinal(theta_i, theta_o, fiber.beta_tt) * von_mises;
   }
   return colored(fiber, density);
@@ -90,8 +92,8 @@ Rgbd bcsdf_albedo(const FiberScattering& fiber, double theta_i) {
   LobeSums sums;
   if (fiber.isotropic_white) {
     const QuadratureRule rule = gauss_legendre(24, -kHalfPi, kHalfPi);
-    sums.r = integrate(rule, [](double theta_o) { return std::cos(theta_o) * std::cos(theta_o); }) * 2.0 *
-             kPi / (kPi * kPi);
+    sums.r = integrate(rule, [](double theta_o) { return std::cos(theta_o) * std::cos(theta_o); }) *
+             2.0 * kPi / (kPi * kPi);
     return colored(fiber, sums);
   }
   const auto outgoing_share = [theta_i](double beta) {
@@ -118,15 +120,17 @@ Rgbd bcsdf_albedo(const FiberScattering& fiber, double theta_i) {
 std::vector<Rgbd> bcsdf_sh(const FiberScattering& fiber, double theta_o, int order, Lobe lobe) {
   assert(order >= 0 && order <= kMaxShOrder && std::abs(theta_o) <= kHalfPi);
   const int count = sh_count(order);
-  // In azimuth Y_j is a trigonometric polynomial of degree `order`, which 2 order + 2 angles integrate
-  // exactly against a constant and, with the weights below, against the von Mises density: the mean of cos(m
-  // d) over it, d from its peak, is I_m(k) / I_0(k).
+  // In azimuth Y_j is a trigonometric polynomial of degree `order`, which 2 order + 2 angles
+  // integrate exactly against a constant and, with the weights below, against the von Mises
+  // density: the mean of cos(m d) over it, d from its peak, is I_m(k) / I_0(k).
   const int angles = 2 * order + 2;
   std::vector<double> von_mises(static_cast<std::size_t>(angles), 1.0 / angles);
   if (!fiber.isotropic_white) {
-    const std::vector<double> moments = bessel_ratios(order, 1.0 / (fiber.gamma_tt * fiber.gamma_tt));
+    const std::vector<double> moments =
+        bessel_ratios(order, 1.0 / (fiber.gamma_tt * fiber.gamma_tt));
     for (int a = 0; a < angles; ++a) {
-      const double from_peak = 2.0 * kPi * a / angles - kPi;  // wo lies at azimuth 0, TT's peak at pi
+      // wo lies at azimuth 0, TT's peak at pi
+      const double from_peak = 2.0 * kPi * a / angles - kPi;
       for (int m = 1; m <= order; ++m) {
         von_mises[static_cast<std::size_t>(a)] +=
             2.0 / angles * moments[static_cast<std::size_t>(m)] * std::cos(m * from_peak);

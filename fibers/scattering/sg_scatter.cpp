@@ -21,7 +21,8 @@ Eigen::Vector2d azimuth(const Vec3d& direction, double cosine) {
 // One lobe under one light: the integrand B exp(E) over theta.
 class LobeIntegrand {
  public:
-  LobeIntegrand(const FiberScattering& fiber, const SphericalGaussian& light, const Vec3d& wo, bool is_tt)
+  LobeIntegrand(const FiberScattering& fiber, const SphericalGaussian& light, const Vec3d& wo,
+                bool is_tt)
       : white_(fiber.isotropic_white), is_tt_(is_tt), sharpness_(light.sharpness) {
     light_cosine_ = std::hypot(light.axis.y(), light.axis.z());
     light_theta_ = std::atan2(light.axis.x(), light_cosine_);
@@ -49,16 +50,20 @@ class LobeIntegrand {
   double exponent(double theta) const {
     const double from_cone = theta - cone_;
     const double half_sine = std::sin(0.5 * (theta - light_theta_));
-    return -0.5 * inverse_variance_ * from_cone * from_cone - 2.0 * sharpness_ * half_sine * half_sine;
+    return -0.5 * inverse_variance_ * from_cone * from_cone -
+           2.0 * sharpness_ * half_sine * half_sine;
   }
 
   double slope(double theta) const {  // dE / dtheta
     return -inverse_variance_ * (theta - cone_) - sharpness_ * std::sin(theta - light_theta_);
   }
 
-  // B without Schlick's factor; |theta| <= pi/2. The printed I0 and exp overflow: the scaled form is
-  //   exp(-k - A) times the integral over phi_i = 2 pi I0e(m) exp(-q / (m + A + k)), A = sharpness cos(theta)
-  //   cos(theta'), m = sqrt(k^2 + A^2 - 2 k A cos(d)) = sqrt((k - A)^2 + k A |u' - u_o|^2), q = k A |u' +
+  // B without Schlick's factor; |theta| <= pi/2. The printed I0 and exp overflow: the scaled form
+  // is
+  //   exp(-k - A) times the integral over phi_i = 2 pi I0e(m) exp(-q / (m + A + k)), A = sharpness
+  //     cos(theta)
+  //   cos(theta'), m = sqrt(k^2 + A^2 - 2 k A cos(d)) = sqrt((k - A)^2 + k A |u' - u_o|^2), q = k A
+  //     |u' +
   //   u_o|^2.
   double smooth(double theta) const {
     const double cosine = std::sin(kHalfPi - std::abs(theta));
@@ -67,7 +72,8 @@ class LobeIntegrand {
     const double weight = longitudinal_weight(theta, beta_);
     if (!is_tt_) return weight * scaled_bessel_i0(a);
     const double m = std::sqrt((k_ - a) * (k_ - a) + k_ * a * difference2_);
-    return weight * scaled_bessel_i0(m) / scaled_bessel_i0(k_) * std::exp(-k_ * a * sum2_ / (m + a + k_));
+    return weight * scaled_bessel_i0(m) / scaled_bessel_i0(k_) *
+           std::exp(-k_ * a * sum2_ / (m + a + k_));
   }
 
   void add(double theta, double weight, LobeSums& sums) const {
@@ -84,10 +90,12 @@ class LobeIntegrand {
   void printed(LobeSums& sums) const {
     const double theta = centre();
     const double root = std::sqrt(precision());
-    const double length = root > 0.0 ? 0.5 * std::sqrt(kPi) / root *
-                                           erf_difference(root * (-kHalfPi - theta), root * (kHalfPi - theta))
-                                     : kPi;
-    // E at the centre to second order: -(beta^-2 sharpness / (beta^-2 + sharpness)) (theta_o + theta')^2 / 2
+    const double length =
+        root > 0.0 ? 0.5 * std::sqrt(kPi) / root *
+                         erf_difference(root * (-kHalfPi - theta), root * (kHalfPi - theta))
+                   : kPi;
+    // E at the centre to second order: -(beta^-2 sharpness / (beta^-2 + sharpness)) (theta_o +
+    // theta')^2 / 2
     const double gap = light_theta_ - cone_;
     const double drop =
         precision() > 0.0 ? 0.25 * inverse_variance_ * sharpness_ / precision() * gap * gap : 0.0;
@@ -114,8 +122,8 @@ class LobeIntegrand {
   }
 
   void quadrature(LobeSums& sums) const {
-    // E falls from the cone to theta' on one side and from theta' to the cone on the other, so its maximum
-    // lies between: bisection on its slope.
+    // E falls from the cone to theta' on one side and from theta' to the cone on the other, so its
+    // maximum lies between: bisection on its slope.
     double low = std::min(cone_, light_theta_);
     double high = std::max(cone_, light_theta_);
     for (int step = 0; step < 60 && high > low; ++step) {

@@ -3,16 +3,18 @@
 // Gamma: what a fiber scatters to wo from a spherical Gaussian of light,
 //   Gamma = integral of G(wi; axis, sharpness) S(wi, wo) cos(theta_i) over wi,   G not normalised.
 //
-// The azimuth integral is exact in all methods; what remains is, per lobe, over theta = theta_i (Khungurn
-// 2017, appendix A):
+// The azimuth integral is exact in all methods; what remains is, per lobe, over theta = theta_i
+// (Khungurn 2017, appendix A):
 //   Gamma_X = integral of B_X(theta) exp(E(theta)),
-//   E = -(theta + theta_o)^2 / (2 beta^2) - 2 sharpness sin^2((theta - theta') / 2),   theta' that of the
+//   E = -(theta + theta_o)^2 / (2 beta^2) - 2 sharpness sin^2((theta - theta') / 2),   theta' that
+//     of the
 //   axis,
 // with B slow beside exp(E). Fiber frame as in fiber_bcsdf.h.
-// Mean |error| of kPrinted and kDefault at sharpness 25, 100, 400, light within the lobe: R, beta = 10
-// degrees, at |theta_o| = 60 degrees 4.5, 1.9, .6 % and .4, .03, .001 %; at 75 to 85 degrees 13, 15, 13 %
-// and 1.4, .7, .2 %. Plain Gauss-Hermite nodes, not cut at the ends, have 8, 4, 2 % there; recentring by a
-// Newton step changes nothing. Tested in tests/fibers/scattering/sg_scatter_test.cpp, which prints the table.
+// Mean |error| of kPrinted and kDefault at sharpness 25, 100, 400, light within the lobe: R, beta =
+// 10 degrees, at |theta_o| = 60 degrees 4.5, 1.9, .6 % and .4, .03, .001 %; at 75 to 85 degrees 13,
+// 15, 13 % and 1.4, .7, .2 %. Plain Gauss-Hermite nodes, not cut at the ends, have 8, 4, 2 % there;
+// recentring by a Newton step changes nothing. Tested in
+// tests/fibers/scattering/sg_scatter_test.cpp, which prints the table.
 
 #include "fibers/math/quadrature.h"
 #include "fibers/math/spherical_gaussian.h"
@@ -30,16 +32,16 @@ enum class SgMethod {
 Rgbd sg_scatter(const FiberScattering& fiber, const SphericalGaussian& light, const Vec3d& wo,
                 SgMethod method, Lobe lobe = Lobe::kAll);
 
-/// kDefault puts its nodes where the Gaussian exp(-precision (theta - centre)^2) puts them, cut at the nearer
-/// end of
-/// [-pi/2, pi/2]. Below kBroadPrecision both ends matter and it uses kBroadNodes Gauss-Legendre nodes
-/// instead.
+/// kDefault puts its nodes where the Gaussian exp(-precision (theta - centre)^2) puts them, cut at
+/// the nearer end of
+/// [-pi/2, pi/2]. Below kBroadPrecision both ends matter and it uses kBroadNodes Gauss-Legendre
+/// nodes instead.
 inline constexpr double kBroadPrecision = 4.0;
 inline constexpr int kBroadNodes = 8;
 
-/// Rules for that Gaussian, by the distance of its centre from the nearer end times sqrt(precision) (>= 0).
-/// Interpolated between tabulated rules, error of the weights' sum below 1e-5; from kCutReach on the cut does
-/// not show.
+/// Rules for that Gaussian, by the distance of its centre from the nearer end times sqrt(precision)
+/// (>= 0). Interpolated between tabulated rules, error of the weights' sum below 1e-5; from
+/// kCutReach on the cut does not show.
 inline constexpr double kCutReach = 4.0;
 inline constexpr int kCutRules = 257;
 const ThreeNodeRule* cut_rules();  // [kCutRules] for cuts equally spaced in [0, kCutReach]

@@ -17,7 +17,8 @@ constexpr int kRays = 8;
 
 }  // namespace
 
-SegmentOrigins find_segment_origins(const TileScene& scene, bool both_sides, OriginChoice choice, std::uint64_t seed) {
+SegmentOrigins find_segment_origins(const TileScene& scene, bool both_sides, OriginChoice choice,
+                                    std::uint64_t seed) {
   const Exemplar& exemplar = scene.exemplar();
   SegmentOrigins origins;
   origins.position.resize(exemplar.segment_count());
@@ -37,10 +38,12 @@ SegmentOrigins find_segment_origins(const TileScene& scene, bool both_sides, Ori
       for (int k = 0; k < kAzimuths; ++k) {
         const float azimuth = 2 * kPif * (static_cast<float>(k) + random.uniform()) / kAzimuths;
         const Vec3 normal = frame * Vec3(0, std::cos(azimuth), std::sin(azimuth));
-        const Vec3 point =
-            start + (static_cast<float>(station) + random.uniform()) / kStations * along + radius * normal;
+        const Vec3 point = start +
+                           (static_cast<float>(station) + random.uniform()) / kStations * along +
+                           radius * normal;
         for (int ray = 0; ray < kRays; ++ray) {
-          const Vec3 sky = both_sides ? sample_sphere(random) : sample_hemisphere(Vec3(0, 0, 1), random);
+          const Vec3 sky =
+              both_sides ? sample_sphere(random) : sample_hemisphere(Vec3(0, 0, 1), random);
           const float cosine = normal.dot(sky);
           if (cosine <= 0) continue;
           possible += cosine;
@@ -53,7 +56,8 @@ SegmentOrigins find_segment_origins(const TileScene& scene, bool both_sides, Ori
     origins.openness[i] = possible > 0 ? seen / possible : 0;
     origins.position[i] = exemplar.segment_midpoint(segment);
     const Vec3 across = exposed - exposed.dot(frame.col(0)) * frame.col(0);
-    if (choice == OriginChoice::kExposed && across.norm() > 0) origins.position[i] += kExposedDepth * radius * across.normalized();
+    if (choice == OriginChoice::kExposed && across.norm() > 0)
+      origins.position[i] += kExposedDepth * radius * across.normalized();
   });
   return origins;
 }

@@ -16,8 +16,9 @@
 namespace heddle {
 namespace {
 
-// A segment belongs to the tile's structure where its capsule reaches within this share of the tile's size of the tile,
-// and rays are followed as far beyond a tile's edge, so that rounding cannot lose a hit on the edge.
+// A segment belongs to the tile's structure where its capsule reaches within this share of the
+// tile's size of the tile, and rays are followed as far beyond a tile's edge, so that rounding
+// cannot lose a hit on the edge.
 constexpr float kEdgeMargin = 1e-4F;
 
 // Embree's own 53 and 50 more while it builds, and our copies of points and indices.
@@ -52,7 +53,8 @@ struct TileScene::Impl {
   }
 };
 
-TileScene::TileScene(Exemplar exemplar) : exemplar_(std::move(exemplar)), impl_(std::make_unique<Impl>()) {
+TileScene::TileScene(Exemplar exemplar)
+    : exemplar_(std::move(exemplar)), impl_(std::make_unique<Impl>()) {
   require_memory(kBytesPerSegment * exemplar_.segment_count(),
                  fmt::format("ray tracing of {} segments", exemplar_.segment_count()));
   impl_->device = rtcNewDevice(nullptr);
@@ -91,7 +93,8 @@ TileScene::TileScene(Exemplar exemplar) : exemplar_(std::move(exemplar)), impl_(
     const int j_max = static_cast<int>(std::ceil((ex.height_mm - low.y() + r) / ex.height_mm));
     for (int j = j_min; j <= j_max; ++j) {
       for (int i = i_min; i <= i_max; ++i) {
-        const Vec3 shift(static_cast<float>(i) * ex.width_mm, static_cast<float>(j) * ex.height_mm, 0);
+        const Vec3 shift(static_cast<float>(i) * ex.width_mm, static_cast<float>(j) * ex.height_mm,
+                         0);
         const std::size_t first_vertex = vertices.size();
         bool any = false;
         for (std::uint32_t k = 0; k + 1 < count; ++k) {
@@ -105,8 +108,9 @@ TileScene::TileScene(Exemplar exemplar) : exemplar_(std::move(exemplar)), impl_(
           }
           any = true;
           first_vertex_of_primitive.push_back(static_cast<std::uint32_t>(first_vertex + k));
-          flags.push_back(static_cast<std::uint8_t>((k > 0 ? RTC_CURVE_FLAG_NEIGHBOR_LEFT : 0) |
-                                                    (k + 2 < count ? RTC_CURVE_FLAG_NEIGHBOR_RIGHT : 0)));
+          flags.push_back(
+              static_cast<std::uint8_t>((k > 0 ? RTC_CURVE_FLAG_NEIGHBOR_LEFT : 0) |
+                                        (k + 2 < count ? RTC_CURVE_FLAG_NEIGHBOR_RIGHT : 0)));
           impl_->segment_of_primitive.push_back(first_segment + k);
           impl_->fiber_of_primitive.push_back(f);
         }
@@ -120,13 +124,15 @@ TileScene::TileScene(Exemplar exemplar) : exemplar_(std::move(exemplar)), impl_(
   }
 
   RTCGeometry geometry = rtcNewGeometry(impl_->device, RTC_GEOMETRY_TYPE_ROUND_LINEAR_CURVE);
-  auto copy = [&](RTCBufferType type, RTCFormat format, std::size_t stride, std::size_t items, const void* from) {
+  auto copy = [&](RTCBufferType type, RTCFormat format, std::size_t stride, std::size_t items,
+                  const void* from) {
     void* to = rtcSetNewGeometryBuffer(geometry, type, 0, format, stride, items);
     std::memcpy(to, from, stride * items);
   };
-  copy(RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT4, sizeof(Eigen::Vector4f), vertices.size(), vertices.data());
-  copy(RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT, sizeof(std::uint32_t), first_vertex_of_primitive.size(),
-       first_vertex_of_primitive.data());
+  copy(RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT4, sizeof(Eigen::Vector4f), vertices.size(),
+       vertices.data());
+  copy(RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT, sizeof(std::uint32_t),
+       first_vertex_of_primitive.size(), first_vertex_of_primitive.data());
   copy(RTC_BUFFER_TYPE_FLAGS, RTC_FORMAT_UCHAR, 1, flags.size(), flags.data());
   rtcSetGeometryIntersectFilterFunction(geometry, ignore_own_fiber);
   rtcSetGeometryOccludedFilterFunction(geometry, ignore_own_fiber);
@@ -140,8 +146,12 @@ TileScene::TileScene(Exemplar exemplar) : exemplar_(std::move(exemplar)), impl_(
 
 TileScene::~TileScene() = default;
 
-std::uint64_t TileScene::abandoned_rays() const { return impl_->abandoned.load(); }
-std::size_t TileScene::memory_bytes() const { return static_cast<std::size_t>(impl_->bytes.load()); }
+std::uint64_t TileScene::abandoned_rays() const {
+  return impl_->abandoned.load();
+}
+std::size_t TileScene::memory_bytes() const {
+  return static_cast<std::size_t>(impl_->bytes.load());
+}
 
 template <bool kAnyHit>
 bool TileScene::march(const Ray& ray, std::uint32_t own_fiber, FiberHit* hit) const {
@@ -167,8 +177,8 @@ bool TileScene::march(const Ray& ray, std::uint32_t own_fiber, FiberHit* hit) co
   if (!(t <= t_end)) return false;
 
   const double size[2] = {ex.width_mm, ex.height_mm};
-  double cell[2];       // tile index
-  double t_next[2];     // where the ray leaves the tile along this axis
+  double cell[2];    // tile index
+  double t_next[2];  // where the ray leaves the tile along this axis
   double t_step[2];
   double step[2];
   const Vec3d start = origin + t * direction;
@@ -255,12 +265,14 @@ double TileScene::mean_free_path(std::uint64_t seed, int samples) const {
   int hits = 0;
   for (int i = 0; i < samples; ++i) {
     RandomStream random(seed, RandomStage::kMeanFreePath, 0, static_cast<std::uint64_t>(i));
-    const auto found =
-        std::upper_bound(cumulative_length.begin(), cumulative_length.end(), random.uniform_double() * total);
-    const auto s = static_cast<std::uint32_t>(std::min(static_cast<std::size_t>(found - cumulative_length.begin()),
-                                                       exemplar_.segment_count() - 1));
+    const auto found = std::upper_bound(cumulative_length.begin(), cumulative_length.end(),
+                                        random.uniform_double() * total);
+    const auto s = static_cast<std::uint32_t>(
+        std::min(static_cast<std::size_t>(found - cumulative_length.begin()),
+                 exemplar_.segment_count() - 1));
     const std::uint32_t p = exemplar_.segment_point[s];
-    const Vec3 origin = exemplar_.points[p] + random.uniform() * (exemplar_.points[p + 1] - exemplar_.points[p]);
+    const Vec3 origin =
+        exemplar_.points[p] + random.uniform() * (exemplar_.points[p + 1] - exemplar_.points[p]);
     const Vec3 direction = sample_sphere(random);
     if (const auto hit = intersect({origin, direction}, exemplar_.segment_fiber[s])) {
       sum += hit->t;

@@ -39,7 +39,8 @@ class TileTrace {
   }
 
  private:
-  std::optional<Vertex> query(const Vec3& origin, const Vec3& direction, std::uint32_t own_fiber) const {
+  std::optional<Vertex> query(const Vec3& origin, const Vec3& direction,
+                              std::uint32_t own_fiber) const {
     const std::optional<FiberHit> hit = scene_->intersect({origin, direction}, own_fiber);
     if (!hit) return {};
     return at(origin + hit->t * direction, hit->segment);

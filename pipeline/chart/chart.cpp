@@ -96,13 +96,16 @@ std::vector<bool> pareto_front(std::span<const CostAndError> points) {
     if (std::isfinite(points[k].cost) && std::isfinite(points[k].error)) order.push_back(k);
   }
   std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-    return points[a].cost != points[b].cost ? points[a].cost < points[b].cost : points[a].error < points[b].error;
+    return points[a].cost != points[b].cost ? points[a].cost < points[b].cost
+                                            : points[a].error < points[b].error;
   });
-  // From cheap to dear: a point is on the front where it errs less than all cheaper ones, or repeats the last such point.
+  // From cheap to dear: a point is on the front where it errs less than all cheaper ones, or
+  // repeats the last such point.
   std::vector<bool> on_front(points.size(), false);
   const CostAndError* best = nullptr;
   for (const std::size_t k : order) {
-    const bool repeats = best != nullptr && points[k].cost == best->cost && points[k].error == best->error;
+    const bool repeats =
+        best != nullptr && points[k].cost == best->cost && points[k].error == best->error;
     if (best != nullptr && !repeats && points[k].error >= best->error) continue;
     on_front[k] = true;
     best = &points[k];
@@ -129,27 +132,29 @@ void mark_fronts(Chart& chart) {
 }
 
 Json chart_json(const Chart& chart) {
-  Json json = {
-      {"format", "heddle chart"},
-      {"version", 1},
-      {"program_version", kProgramVersion},
-      {"scene", {{"name", chart.scene}, {"file", chart.scene_file}, {"view", chart.view}}},
-      {"picture",
-       {{"width", chart.width},
-        {"height", chart.height},
-        {"crop", {chart.crop.x0, chart.crop.y0, chart.crop.x0 + chart.crop.width, chart.crop.y0 + chart.crop.height}}}},
-      {"machine", {{"processor", chart.processor}, {"threads", chart.threads}}}};
+  Json json = {{"format", "heddle chart"},
+               {"version", 1},
+               {"program_version", kProgramVersion},
+               {"scene", {{"name", chart.scene}, {"file", chart.scene_file}, {"view", chart.view}}},
+               {"picture",
+                {{"width", chart.width},
+                 {"height", chart.height},
+                 {"crop",
+                  {chart.crop.x0, chart.crop.y0, chart.crop.x0 + chart.crop.width,
+                   chart.crop.y0 + chart.crop.height}}}},
+               {"machine", {{"processor", chart.processor}, {"threads", chart.threads}}}};
   for (const ReferenceKind kind : kReferenceKinds) {
     const ChartReference& reference = chart.references[static_cast<std::size_t>(kind)];
-    json["references"][reference_name(kind)] = {{"key", reference.key},
-                                                {"seed", reference.request.seed},
-                                                {"spp", reference.request.spp},
-                                                {"seconds", reference.seconds},
-                                                {"core_seconds", reference.core_seconds},
-                                                {"relative_noise", reference.noise.rms},
-                                                {"noise_percentile99", reference.noise.percentile99},
-                                                {"flip_between_halves", reference.flip_between_halves},
-                                                {"picture", reference.picture.generic_string()}};
+    json["references"][reference_name(kind)] = {
+        {"key", reference.key},
+        {"seed", reference.request.seed},
+        {"spp", reference.request.spp},
+        {"seconds", reference.seconds},
+        {"core_seconds", reference.core_seconds},
+        {"relative_noise", reference.noise.rms},
+        {"noise_percentile99", reference.noise.percentile99},
+        {"flip_between_halves", reference.flip_between_halves},
+        {"picture", reference.picture.generic_string()}};
   }
   json["rows"] = Json::array();
   for (const ChartRow& row : chart.rows) json["rows"].push_back(row_json(row));
@@ -175,13 +180,15 @@ std::string chart_csv(const Chart& chart) {
                                           "render_seconds",
                                           "render_core_seconds",
                                           "total_seconds"};
-  const std::vector<std::string> measured = {"relative_rmse", "relative_rmse_low", "relative_rmse_high", "percentile99",
-                                             "flip",          "front_render",      "front_total"};
+  const std::vector<std::string> measured = {
+      "relative_rmse", "relative_rmse_low", "relative_rmse_high", "percentile99",
+      "flip",          "front_render",      "front_total"};
   const char* const channels[] = {"r", "g", "b"};
   std::vector<std::string> names = plain;
   names.insert(names.begin() + 2, "settings");
   for (const ReferenceKind kind : kReferenceKinds) {
-    for (const std::string& name : measured) names.push_back(fmt::format("{}_{}", reference_name(kind), name));
+    for (const std::string& name : measured)
+      names.push_back(fmt::format("{}_{}", reference_name(kind), name));
     for (const char* channel : channels)
       names.push_back(fmt::format("{}_color_ratio_{}", reference_name(kind), channel));
   }
@@ -191,13 +198,16 @@ std::string chart_csv(const Chart& chart) {
     for (const std::string& name : plain) fields.push_back(csv_field(row.at(name)));
     std::vector<std::string> settings;
     for (const auto& [name, value] : row.at("settings").items()) {
-      settings.push_back(fmt::format("{}={}", name, value.is_string() ? value.get<std::string>() : value.dump()));
+      settings.push_back(
+          fmt::format("{}={}", name, value.is_string() ? value.get<std::string>() : value.dump()));
     }
     fields.insert(fields.begin() + 2, csv_field(fmt::format("{}", fmt::join(settings, " "))));
     for (const ReferenceKind kind : kReferenceKinds) {
       const Json& error = row.at("error").at(reference_name(kind));
-      for (const std::string& name : measured) fields.push_back(error.is_null() ? "" : csv_field(error.at(name)));
-      for (std::size_t c = 0; c < 3; ++c) fields.push_back(error.is_null() ? "" : error.at("color_ratio").at(c).dump());
+      for (const std::string& name : measured)
+        fields.push_back(error.is_null() ? "" : csv_field(error.at(name)));
+      for (std::size_t c = 0; c < 3; ++c)
+        fields.push_back(error.is_null() ? "" : error.at("color_ratio").at(c).dump());
     }
     add(fields);
   }

@@ -1,8 +1,9 @@
 #ifndef HEDDLE_PIPELINE_CHART_CHART_H_
 #define HEDDLE_PIPELINE_CHART_CHART_H_
-// Speed against accuracy: what every run of a table cost, and how far its picture is from a path-traced reference. Runs go one
-// after the other in one process, so that all have the same machine and threads. Everything written is explained in
-// docs/chart.md; its JSON follows docs/chart-schema.json. Tested in tests/pipeline/chart_test.cpp.
+// Speed against accuracy: what every run of a table cost, and how far its picture is from a
+// path-traced reference. Runs go one after the other in one process, so that all have the same
+// machine and threads. Everything written is explained in docs/chart.md; its JSON follows
+// docs/chart-schema.json. Tested in tests/pipeline/chart_test.cpp.
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -41,8 +42,9 @@ struct ChartRow {
   double render_seconds = 0;
   double render_core_seconds = 0;
   int threads = 0;
-  ChartError error[2];                  // [ReferenceKind]
-  bool front_render[2] = {};            // [ReferenceKind] on the Pareto front of render time against error
+  ChartError error[2];  // [ReferenceKind]
+  // [ReferenceKind] on the Pareto front of render time against error
+  bool front_render[2] = {};
   bool front_total[2] = {};             // [ReferenceKind] the same with the precomputation counted
   std::filesystem::path picture;        // .png, from the chart's folder; so are the differences
   std::filesystem::path difference[2];  // [ReferenceKind]
@@ -82,8 +84,8 @@ struct CostAndError {
   double cost = 0;
   double error = 0;
 };
-/// Is the point on the Pareto front: does no other cost no more and err no more, one of them less? Points that are not
-/// finite are never on it.
+/// Is the point on the Pareto front: does no other cost no more and err no more, one of them less?
+/// Points that are not finite are never on it.
 std::vector<bool> pareto_front(std::span<const CostAndError> points);
 
 /// Fills front_render and front_total of all rows that are done.

@@ -159,7 +159,8 @@ std::string chart_html(const Chart& chart, const fs::path& folder) {
   nlohmann::ordered_json images = nlohmann::ordered_json::object();
   const auto embed = [&](const fs::path& path) {
     const std::string name = path.generic_string();
-    if (!images.contains(name)) images[name] = "data:image/png;base64," + base64(read_whole_file(folder / path));
+    if (!images.contains(name))
+      images[name] = "data:image/png;base64," + base64(read_whole_file(folder / path));
   };
   for (const ChartReference& reference : chart.references) embed(reference.picture);
   for (const ChartRow& row : chart.rows) {
@@ -170,8 +171,8 @@ std::string chart_html(const Chart& chart, const fs::path& folder) {
 
   std::string charts;
   for (const ReferenceKind kind : kReferenceKinds) {
-    charts += fmt::format("<div class=\"chart\" data-reference=\"{}\">\n{}</div>\n", reference_name(kind),
-                          chart_svg(chart, kind));
+    charts += fmt::format("<div class=\"chart\" data-reference=\"{}\">\n{}</div>\n",
+                          reference_name(kind), chart_svg(chart, kind));
   }
   return fmt::format(
       R"(<!DOCTYPE html>
@@ -202,8 +203,9 @@ Measured against <button data-reference="full">all light</button> <button data-r
 </body>
 </html>
 )",
-      xml_text(chart.scene), kStyle, chart.crop.width, chart.crop.height, chart.threads, xml_text(chart.processor),
-      xml_text(json.at("program_version").get<std::string>()), charts, script_text(json), script_text(images), kScript);
+      xml_text(chart.scene), kStyle, chart.crop.width, chart.crop.height, chart.threads,
+      xml_text(chart.processor), xml_text(json.at("program_version").get<std::string>()), charts,
+      script_text(json), script_text(images), kScript);
 }
 
 }  // namespace heddle

@@ -44,7 +44,8 @@ SceneVariant of_blend(const VisibilityBlend& blend) {
 
 }  // namespace
 
-std::vector<ChartRun> chart_runs(const SceneConfig& scene, const PictureRequest& base, const ChartLadders& ladders) {
+std::vector<ChartRun> chart_runs(const SceneConfig& scene, const PictureRequest& base,
+                                 const ChartLadders& ladders) {
   const bool quick = ladders.quick;
   const int spp = ladders.spp;
   const PictureRequest exact = with(base, RenderMethod::kExact, spp);
@@ -57,19 +58,21 @@ std::vector<ChartRun> chart_runs(const SceneConfig& scene, const PictureRequest&
     runs.push_back({"path", spp_label(n), {{"spp", n}}, {}, with(base, RenderMethod::kPath, n)});
   }
   for (const int n : quick ? List{2, 8} : List{2, 4, 16, 64, 256}) {
-    runs.push_back({"path, local", spp_label(n), {{"spp", n}}, {}, local(with(base, RenderMethod::kPath, n))});
+    runs.push_back(
+        {"path, local", spp_label(n), {{"spp", n}}, {}, local(with(base, RenderMethod::kPath, n))});
   }
   for (const int n : quick ? List{1, 4} : List{1, 4, 16, 64}) {
     runs.push_back({"exact", spp_label(n), {{"spp", n}}, {}, with(base, RenderMethod::kExact, n)});
   }
   for (const int n : quick ? List{1, 4} : List{1, 4, 16, 64}) {
-    runs.push_back({"volume", spp_label(n), {{"spp", n}}, {}, with(base, RenderMethod::kVolume, n)});
+    runs.push_back(
+        {"volume", spp_label(n), {{"spp", n}}, {}, with(base, RenderMethod::kVolume, n)});
   }
 
   // Both ways to shade surface cloth that has a choice.
-  const bool any_interactive = std::any_of(scene.cloths.begin(), scene.cloths.end(), [](const ClothConfig& cloth) {
-    return cloth.surface && cloth.surface->interactive;
-  });
+  const bool any_interactive = std::any_of(
+      scene.cloths.begin(), scene.cloths.end(),
+      [](const ClothConfig& cloth) { return cloth.surface && cloth.surface->interactive; });
   for (const SurfaceMethod method : {SurfaceMethod::kSampled, SurfaceMethod::kInteractive}) {
     if (!any_interactive) break;
     const std::string name = method == SurfaceMethod::kSampled ? "sampled" : "interactive";
@@ -84,8 +87,8 @@ std::vector<ChartRun> chart_runs(const SceneConfig& scene, const PictureRequest&
     }
   }
 
-  const bool any_fibers =
-      std::any_of(scene.cloths.begin(), scene.cloths.end(), [](const ClothConfig& cloth) { return !cloth.surface; });
+  const bool any_fibers = std::any_of(scene.cloths.begin(), scene.cloths.end(),
+                                      [](const ClothConfig& cloth) { return !cloth.surface; });
   if (!any_fibers) return runs;  // nothing below changes surface models
 
   // Spherical-harmonic order of the transfer.
@@ -107,16 +110,22 @@ std::vector<ChartRun> chart_runs(const SceneConfig& scene, const PictureRequest&
   // Form of visibility, where some light can tell.
   const auto any_gaussian = [&scene](auto&& condition) {
     return std::any_of(scene.lights.begin(), scene.lights.end(),
-                       [&](const Light& light) {  // Gaussians that stand for an environment may be sharp and soft.
+                       // Gaussians that stand for an environment may be sharp and soft.
+                       [&](const Light& light) {
                          if (light.type == LightType::kEnvironment) return true;
                          return !light.is_directional() && condition(light.sharpness);
                        });
   };
   const VisibilityBlend usual;
   const auto add_blend = [&](const char* name, const VisibilityBlend& blend) {
-    runs.push_back({"exact, form of visibility", name, {{"spp", spp}, {"visibility", name}}, of_blend(blend), exact});
+    runs.push_back({"exact, form of visibility",
+                    name,
+                    {{"spp", spp}, {"visibility", name}},
+                    of_blend(blend),
+                    exact});
   };
-  if (any_gaussian([&](float sharpness) { return usual.uses_distance(sharpness); })) add_blend("Gaussians", kLobesOnly);
+  if (any_gaussian([&](float sharpness) { return usual.uses_distance(sharpness); }))
+    add_blend("Gaussians", kLobesOnly);
   if (any_gaussian([&](float sharpness) { return usual.uses_lobes(sharpness); })) {
     add_blend("signed distance", kSignedDistanceOnly);
   }
@@ -131,10 +140,11 @@ std::vector<ChartRun> chart_runs(const SceneConfig& scene, const PictureRequest&
   }
   // The rivals (docs/rivals.md). Paths come in two halves, so their samples are even.
   for (const RenderMethod method :
-       {RenderMethod::kPrinted, RenderMethod::kPrt, RenderMethod::kTsaiShih16, RenderMethod::kTsaiShihFull,
-        RenderMethod::kDualScattering, RenderMethod::kPath6}) {
+       {RenderMethod::kPrinted, RenderMethod::kPrt, RenderMethod::kTsaiShih16,
+        RenderMethod::kTsaiShihFull, RenderMethod::kDualScattering, RenderMethod::kPath6}) {
     for (const int n : quick ? List{} : List{4, 16, 64}) {
-      runs.push_back({render_method_name(method), spp_label(n), {{"spp", n}}, {}, with(base, method, n)});
+      runs.push_back(
+          {render_method_name(method), spp_label(n), {{"spp", n}}, {}, with(base, method, n)});
     }
   }
   return runs;

@@ -1,8 +1,8 @@
 #ifndef HEDDLE_PIPELINE_CHART_CHART_RUNS_H_
 #define HEDDLE_PIPELINE_CHART_CHART_RUNS_H_
-// The runs of `heddle chart`: every method at a ladder of settings, as one plain table. A method is added by its rows in
-// chart_runs(); everything else (measuring, tables, charts) goes by what the rows say. docs/chart.md lists the ladders.
-// Tested in tests/pipeline/chart_test.cpp.
+// The runs of `heddle chart`: every method at a ladder of settings, as one plain table. A method is
+// added by its rows in chart_runs(); everything else (measuring, tables, charts) goes by what the
+// rows say. docs/chart.md lists the ladders. Tested in tests/pipeline/chart_test.cpp.
 
 #include <nlohmann/json.hpp>
 #include <string>
@@ -25,10 +25,11 @@ struct ChartLadders {
   int spp = 64;        // of curves along which something else changes: noise must not hide it
 };
 
-/// base: camera, crop and seed of the picture. Runs of one method lie together, from its cheapest setting to its dearest
-/// where that is known beforehand; forms of visibility are there where
-/// some light of the scene can tell them apart.
-std::vector<ChartRun> chart_runs(const SceneConfig& scene, const PictureRequest& base, const ChartLadders& ladders);
+/// base: camera, crop and seed of the picture. Runs of one method lie together, from its cheapest
+/// setting to its dearest where that is known beforehand; forms of visibility are there where some
+/// light of the scene can tell them apart.
+std::vector<ChartRun> chart_runs(const SceneConfig& scene, const PictureRequest& base,
+                                 const ChartLadders& ladders);
 
 }  // namespace heddle
 

@@ -55,15 +55,17 @@ struct Field {
   std::string text;  // the value as it was written
 };
 
-// Characters of a request. Most take a few hundred; a map of `visibility` with 256 x 256 cells takes 66,000.
+// Characters of a request. Most take a few hundred; a map of `visibility` with 256 x 256 cells
+// takes 66,000.
 constexpr std::size_t kLongestLine = std::size_t{256} << 10;
 
 bool is_space(char c) {
   return c == ' ' || c == '\t' || c == '\r' || c == '\n';
 }
 
-// Cuts the line into the fields of its object without interpreting the values, so that an id can be echoed as
-// it was written and an error can name its field. Whether each value is valid JSON shows when it is parsed.
+// Cuts the line into the fields of its object without interpreting the values, so that an id can be
+// echoed as it was written and an error can name its field. Whether each value is valid JSON shows
+// when it is parsed.
 class FieldScanner {
  public:
   explicit FieldScanner(const std::string& line) : line_(line) {}
@@ -161,7 +163,8 @@ Json parse_value(const Field& field) {
   const auto watch = [&](int, Json::parse_event_t event, Json& parsed) {
     if (event == Json::parse_event_t::object_start) names.emplace_back();
     if (event == Json::parse_event_t::object_end) names.pop_back();
-    if (event == Json::parse_event_t::key && !names.back().insert(parsed.get<std::string>()).second) {
+    if (event == Json::parse_event_t::key &&
+        !names.back().insert(parsed.get<std::string>()).second) {
       duplicate = parsed.get<std::string>();
     }
     return true;
@@ -174,7 +177,8 @@ Json parse_value(const Field& field) {
   } catch (const Json::out_of_range&) {
     throw EvalError("field \"" + field.name + "\": the number is not finite in double precision");
   }
-  if (!duplicate.empty()) throw EvalError("duplicate field \"" + field.name + "." + duplicate + "\"");
+  if (!duplicate.empty())
+    throw EvalError("duplicate field \"" + field.name + "." + duplicate + "\"");
   return value;
 }
 
@@ -189,12 +193,14 @@ Json evaluate(const Json& request) {
   for (const Quantity& quantity : kQuantities) {
     if (name == quantity.name) {
       Json value = quantity.evaluate(object);
-      if (!all_finite(value)) throw EvalError("the value of \"" + name + "\" is not finite for these fields");
+      if (!all_finite(value))
+        throw EvalError("the value of \"" + name + "\" is not finite for these fields");
       return value;
     }
   }
   std::string known;
-  for (const Quantity& quantity : kQuantities) known += (known.empty() ? "" : ", ") + std::string(quantity.name);
+  for (const Quantity& quantity : kQuantities)
+    known += (known.empty() ? "" : ", ") + std::string(quantity.name);
   throw EvalError("field \"quantity\": unknown quantity \"" + name + "\"; known: " + known);
 }
 
@@ -240,8 +246,8 @@ Answer answer_line(const std::string& line) {
       } catch (const UnreadableLine&) {
         throw;
       } catch (const EvalError& e) {
-        // An id is echoed, not interpreted: any JSON will do. Other errors wait until the whole line proved
-        // readable.
+        // An id is echoed, not interpreted: any JSON will do. Other errors wait until the whole
+        // line proved readable.
         if (field.name != "id" && error.empty()) error = e.what();
       }
     }
@@ -260,7 +266,8 @@ Answer answer_line(const std::string& line) {
   }
 }
 
-// The next line; of one that is too long, only what shows that it is. False at the end of the stream.
+// The next line; of one that is too long, only what shows that it is. False at the end of the
+// stream.
 bool read_line(std::istream& in, std::string& line) {
   constexpr int kEnd = std::char_traits<char>::eof();
   line.clear();

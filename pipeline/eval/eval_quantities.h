@@ -1,8 +1,8 @@
 #ifndef HEDDLE_PIPELINE_EVAL_EVAL_QUANTITIES_H_
 #define HEDDLE_PIPELINE_EVAL_EVAL_QUANTITIES_H_
-// The quantities that `heddle eval` knows: each reads its fields from the request and returns its value. A
-// new one is declared here, defined in the file of its family and listed in the table of eval.cpp and in
-// docs/eval.md.
+// The quantities that `heddle eval` knows: each reads its fields from the request and returns its
+// value. A new one is declared here, defined in the file of its family and listed in the table of
+// eval.cpp and in docs/eval.md.
 
 #include <nlohmann/json.hpp>
 

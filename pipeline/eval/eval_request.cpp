@@ -51,7 +51,8 @@ std::string EvalObject::string(const std::string& field) {
   return json.get<std::string>();
 }
 
-std::string EvalObject::choice(const std::string& field, std::initializer_list<std::string_view> allowed,
+std::string EvalObject::choice(const std::string& field,
+                               std::initializer_list<std::string_view> allowed,
                                std::string_view fallback) {
   if (!fallback.empty() && !has(field)) return std::string(fallback);
   std::string chosen = string(field);
@@ -67,7 +68,8 @@ std::string EvalObject::choice(const std::string& field, std::initializer_list<s
 std::vector<double> EvalObject::numbers(const std::string& field, std::size_t count) {
   const nlohmann::json& json = value(field);
   if (!json.is_array() || json.size() != count ||
-      !std::all_of(json.begin(), json.end(), [](const nlohmann::json& item) { return item.is_number(); })) {
+      !std::all_of(json.begin(), json.end(),
+                   [](const nlohmann::json& item) { return item.is_number(); })) {
     fail(field, "expected " + std::to_string(count) + " numbers");
   }
   return json.get<std::vector<double>>();
@@ -76,7 +78,8 @@ std::vector<double> EvalObject::numbers(const std::string& field, std::size_t co
 Vec3d unit_vector(const Vec3d& vector, const std::string& name) {
   const double length = vector.norm();
   if (!(std::abs(length - 1.0) <= 1e-3)) {
-    throw EvalError("field \"" + name + "\": must be a unit vector, its length is " + text_of(length));
+    throw EvalError("field \"" + name + "\": must be a unit vector, its length is " +
+                    text_of(length));
   }
   return vector / length;
 }
@@ -102,7 +105,8 @@ EvalObject EvalObject::object(const std::string& field) {
 
 void EvalObject::finish() const {
   for (const auto& item : object_->items()) {
-    if (!known_.contains(item.key())) throw EvalError("unknown field \"" + prefix_ + item.key() + "\"");
+    if (!known_.contains(item.key()))
+      throw EvalError("unknown field \"" + prefix_ + item.key() + "\"");
   }
 }
 

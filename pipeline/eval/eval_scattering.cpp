@@ -12,7 +12,8 @@ nlohmann::json json_of(const Rgbd& color) {
 Rgbd read_color(EvalObject& object, const std::string& field) {
   const std::vector<double> v = object.numbers(field, 3);
   const Rgbd color(v[0], v[1], v[2]);
-  if (color.minCoeff() < 0.0 || color.maxCoeff() > 1.0) object.fail(field, "must lie between 0 and 1");
+  if (color.minCoeff() < 0.0 || color.maxCoeff() > 1.0)
+    object.fail(field, "must lie between 0 and 1");
   return color;
 }
 
@@ -57,7 +58,8 @@ nlohmann::json eval_bcsdf_sh(EvalObject& request) {
   const int order = request.order("order");
   request.finish();
   nlohmann::json rows = nlohmann::json::array();
-  for (const Rgbd& coefficient : bcsdf_sh(fiber, theta_o, order)) rows.push_back(json_of(coefficient));
+  for (const Rgbd& coefficient : bcsdf_sh(fiber, theta_o, order))
+    rows.push_back(json_of(coefficient));
   return rows;
 }
 

@@ -31,7 +31,8 @@ TomlTable read_fabric(EvalObject& request) {
     if (std::find(known.begin(), known.end(), value.get<std::string>()) == known.end()) {
       std::string list;
       for (const std::string& name : known) list += (list.empty() ? "" : ", ") + name;
-      request.fail("fabric", "no microcylinder fabric called \"" + value.get<std::string>() + "\"; known: " + list);
+      request.fail("fabric", "no microcylinder fabric called \"" + value.get<std::string>() +
+                                 "\"; known: " + list);
     }
     return surface_preset(value.get<std::string>());
   }

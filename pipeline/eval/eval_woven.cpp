@@ -52,7 +52,8 @@ Colors read_colors(EvalObject& request) {
 // The value, without n . wi, where the highlight fills that share of what is seen.
 double value_of(const Colors& colors, double share) {
   if (!(colors.wi.z() > 0.0) || !(colors.wo.z() > 0.0)) return 0.0;
-  const double reflectance = highlight_reflectance(colors.wi, colors.wo, colors.ior) / colors.wi.z();
+  const double reflectance =
+      highlight_reflectance(colors.wi, colors.wo, colors.ior) / colors.wi.z();
   return colors.diffuse + (share > 0.0 ? colors.specular * share * reflectance : 0.0);
 }
 
@@ -70,12 +71,14 @@ nlohmann::json eval_woven_btf(EvalObject& request) {
   const Vec2d point = read_point(request, "point");
   const Colors colors = read_colors(request);
   request.finish();
-  return value_of(colors, is_in_highlight(segment, point, half_vector(colors.wi, colors.wo)) ? 1.0 : 0.0);
+  return value_of(colors,
+                  is_in_highlight(segment, point, half_vector(colors.wi, colors.wo)) ? 1.0 : 0.0);
 }
 
 nlohmann::json eval_woven_brdf(EvalObject& request) {
   const nlohmann::json& list = request.value("segments");
-  if (!list.is_array() || list.empty()) request.fail("segments", "expected a list of {segment, area}");
+  if (!list.is_array() || list.empty())
+    request.fail("segments", "expected a list of {segment, area}");
   const Colors colors = read_colors(request);
   const Vec2d half = half_vector(colors.wi, colors.wo);
   double area = 0.0;
@@ -116,8 +119,8 @@ nlohmann::json eval_woven_yarns(EvalObject& request) {
   if (!built) built = std::make_unique<const WovenYarns>(read_woven_yarns(surface_preset(fabric)));
   const WovenYarns& model = *built;
   if (!near)
-    point.footprint_mm =
-        static_cast<float>(1000.0 * model.parameters().unit_mm * model.parameters().pattern.repeat().sum());
+    point.footprint_mm = static_cast<float>(1000.0 * model.parameters().unit_mm *
+                                            model.parameters().pattern.repeat().sum());
   const Rgbd value = model.reflected(point, wi, wo);
   return {value[0], value[1], value[2]};
 }

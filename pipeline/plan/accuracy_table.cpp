@@ -52,11 +52,12 @@ void add_weighted(const Accuracy& entry, double weight, Accuracy& sum) {
 Json entries_json(const std::vector<Accuracy>& entries) {
   Json json = Json::array();
   for (const Accuracy& entry : entries) {
-    json.push_back({{"bias_square", entry.bias_square},
-                    {"bias_square_error", entry.bias_square_error},
-                    {"noise_square", entry.noise_square},
-                    {"change_square", entry.change_square},
-                    {"color_ratio", {entry.color_ratio[0], entry.color_ratio[1], entry.color_ratio[2]}}});
+    json.push_back(
+        {{"bias_square", entry.bias_square},
+         {"bias_square_error", entry.bias_square_error},
+         {"noise_square", entry.noise_square},
+         {"change_square", entry.change_square},
+         {"color_ratio", {entry.color_ratio[0], entry.color_ratio[1], entry.color_ratio[2]}}});
   }
   return json;
 }
@@ -65,9 +66,10 @@ std::vector<Accuracy> entries_of(const nlohmann::json& json) {
   std::vector<Accuracy> entries;
   for (const nlohmann::json& values : json) {
     const auto ratio = values.at("color_ratio").get<std::array<double, 3>>();
-    entries.push_back({values.at("bias_square").get<double>(), values.at("bias_square_error").get<double>(),
-                       values.at("noise_square").get<double>(), values.at("change_square").get<double>(),
-                       Rgbd(ratio[0], ratio[1], ratio[2])});
+    entries.push_back(
+        {values.at("bias_square").get<double>(), values.at("bias_square_error").get<double>(),
+         values.at("noise_square").get<double>(), values.at("change_square").get<double>(),
+         Rgbd(ratio[0], ratio[1], ratio[2])});
   }
   return entries;
 }
@@ -75,17 +77,20 @@ std::vector<Accuracy> entries_of(const nlohmann::json& json) {
 }  // namespace
 
 bool AccuracyTable::has(const std::string& name) const {
-  return std::any_of(settings.begin(), settings.end(), [&](const SettingAccuracy& s) { return s.name == name; });
+  return std::any_of(settings.begin(), settings.end(),
+                     [&](const SettingAccuracy& s) { return s.name == name; });
 }
 
 const SettingAccuracy& AccuracyTable::setting(const std::string& name) const {
-  const auto found =
-      std::find_if(settings.begin(), settings.end(), [&](const SettingAccuracy& s) { return s.name == name; });
-  if (found == settings.end()) throw FileError(fmt::format("accuracy of {}: nothing about \"{}\"", fabric, name));
+  const auto found = std::find_if(settings.begin(), settings.end(),
+                                  [&](const SettingAccuracy& s) { return s.name == name; });
+  if (found == settings.end())
+    throw FileError(fmt::format("accuracy of {}: nothing about \"{}\"", fabric, name));
   return *found;
 }
 
-Accuracy AccuracyTable::at(const std::string& name, double light_sharpness, double footprint, double cosine) const {
+Accuracy AccuracyTable::at(const std::string& name, double light_sharpness, double footprint,
+                           double cosine) const {
   const SettingAccuracy& of = setting(name);
   const Place light = place_of(sharpness, light_sharpness, logarithm);
   const Place pixel = place_of(footprint_mm, footprint, logarithm);
@@ -114,7 +119,8 @@ Accuracy AccuracyTable::at_bent(const std::string& name, double light_sharpness)
 double AccuracyTable::between_at(double light_sharpness) const {
   if (bent_between.empty()) return 0;
   const Place light = place_of(sharpness, light_sharpness, logarithm);
-  return std::max(0.0, (1 - light.share) * bent_between[light.low] + light.share * bent_between[light.high]);
+  return std::max(
+      0.0, (1 - light.share) * bent_between[light.low] + light.share * bent_between[light.high]);
 }
 
 Json accuracy_json(const AccuracyTable& table) {
@@ -160,7 +166,8 @@ AccuracyTable read_accuracy(const std::filesystem::path& path) {
     AccuracyTable table;
     table.fabric = json.at("fabric").get<std::string>();
     table.key = json.at("key").get<std::string>();
-    if (!json.at("threads").is_number_integer()) throw FileError(path.string() + ": threads is no integer");
+    if (!json.at("threads").is_number_integer())
+      throw FileError(path.string() + ": threads is no integer");
     table.threads = json.at("threads").get<int>();
     table.sharpness = json.at("sharpness").get<std::vector<double>>();
     table.footprint_mm = json.at("footprint_mm").get<std::vector<double>>();
@@ -172,14 +179,17 @@ AccuracyTable read_accuracy(const std::filesystem::path& path) {
     const auto color = json.at("color").get<std::array<double, 3>>();
     table.color = Rgbd(color[0], color[1], color[2]);
     table.through = json.at("through").get<double>();
-    const std::size_t count = table.sharpness.size() * table.footprint_mm.size() * table.light_cosine.size();
+    const std::size_t count =
+        table.sharpness.size() * table.footprint_mm.size() * table.light_cosine.size();
     const auto increases = [](const std::vector<double>& values) {
       return !values.empty() && values.front() >= 0 &&
-             std::adjacent_find(values.begin(), values.end(), std::greater_equal<>()) == values.end();
+             std::adjacent_find(values.begin(), values.end(), std::greater_equal<>()) ==
+                 values.end();
     };
-    if (!increases(table.sharpness) || !increases(table.footprint_mm) || !increases(table.light_cosine) ||
-        table.threads < 1) {
-      throw FileError(path.string() + ": an accuracy table without increasing sharpnesses, footprints and cosines");
+    if (!increases(table.sharpness) || !increases(table.footprint_mm) ||
+        !increases(table.light_cosine) || table.threads < 1) {
+      throw FileError(path.string() +
+                      ": an accuracy table without increasing sharpnesses, footprints and cosines");
     }
     if (!table.bent_between.empty() && table.bent_between.size() != table.sharpness.size()) {
       throw FileError(path.string() + ": light from fold to fold is not given for every sharpness");
@@ -207,7 +217,8 @@ AccuracyTable read_accuracy(const std::filesystem::path& path) {
 
 std::string accuracy_text(const AccuracyTable& table) {
   std::string text = fmt::format("{:<22} {:>12} ", "RMSE in % (noise/√spp)", "sharpness");
-  for (const double footprint : table.footprint_mm) text += fmt::format("{:>12}", fmt::format("{:.3g} mm", footprint));
+  for (const double footprint : table.footprint_mm)
+    text += fmt::format("{:>12}", fmt::format("{:.3g} mm", footprint));
   text += fmt::format("{:>12}{:>16}\n", "folded", "µs per sample");
   for (const SettingAccuracy& setting : table.settings) {
     for (std::size_t l = 0; l < table.sharpness.size(); ++l) {
@@ -215,8 +226,10 @@ std::string accuracy_text(const AccuracyTable& table) {
       text += fmt::format("{:<22} {:>12} ", l == 0 ? setting.name : "",
                           directional ? "directional" : fmt::format("{:g}", table.sharpness[l]));
       const auto add = [&text](const Accuracy& entry) {
-        text += fmt::format("{:>12}", fmt::format("{:.1f} ({:.0f})", 100 * std::sqrt(std::max(0.0, entry.bias_square)),
-                                                  100 * std::sqrt(std::max(0.0, entry.noise_square))));
+        text +=
+            fmt::format("{:>12}", fmt::format("{:.1f} ({:.0f})",
+                                              100 * std::sqrt(std::max(0.0, entry.bias_square)),
+                                              100 * std::sqrt(std::max(0.0, entry.noise_square))));
       };
       const std::size_t heights = table.light_cosine.size();
       for (std::size_t h = heights; h-- > 0;) {
@@ -237,9 +250,11 @@ std::string accuracy_text(const AccuracyTable& table) {
                         100 * std::sqrt(std::max(0.0, table.bent_between[l])),
                         l + 1 < table.bent_between.size() ? "" : "\n");
   }
-  text += fmt::format("lit from behind: {:.2f} of what it shows lit from its face\n", table.through);
+  text +=
+      fmt::format("lit from behind: {:.2f} of what it shows lit from its face\n", table.through);
   for (const auto& [part, cost] : table.costs) {
-    text += fmt::format("to build {:<26} {:.3g} s ({} threads)\n", part, cost.seconds, table.threads);
+    text +=
+        fmt::format("to build {:<26} {:.3g} s ({} threads)\n", part, cost.seconds, table.threads);
   }
   return text;
 }

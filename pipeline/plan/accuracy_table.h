@@ -1,9 +1,10 @@
 #ifndef HEDDLE_PIPELINE_PLAN_ACCURACY_TABLE_H_
 #define HEDDLE_PIPELINE_PLAN_ACCURACY_TABLE_H_
-// What the methods are worth on one fabric, measured on a flat and on a folded swatch of it (measure_accuracy.h): for lights of several
-// sharpnesses and pixels of several footprints, each setting's error apart from noise, its noise and its speed; and what its
-// data took to build. A small JSON file, the artifact of the stage `accuracy`; the planner reads it before anything else is built.
-// Errors: FileError. Tested in tests/pipeline/plan_test.cpp.
+// What the methods are worth on one fabric, measured on a flat and on a folded swatch of it
+// (measure_accuracy.h): for lights of several sharpnesses and pixels of several footprints, each
+// setting's error apart from noise, its noise and its speed; and what its data took to build. A
+// small JSON file, the artifact of the stage `accuracy`; the planner reads it before anything else
+// is built. Errors: FileError. Tested in tests/pipeline/plan_test.cpp.
 
 #include <filesystem>
 #include <map>
@@ -19,9 +20,11 @@ namespace heddle {
 /// Sharpness that stands for directional light: no spherical Gaussian is told from it.
 inline constexpr double kDirectionalSharpness = 1e5;
 
-/// One setting under one light, at one footprint. Squares are relative to the squared mean radiance.
+/// One setting under one light, at one footprint. Squares are relative to the squared mean
+/// radiance.
 struct Accuracy {
-  double bias_square = 0;        // mean square of (setting - path tracing), noise taken out; may be slightly negative
+  // mean square of (setting - path tracing), noise taken out; may be slightly negative
+  double bias_square = 0;
   double bias_square_error = 0;  // one standard error, for another pair of view and light
   double noise_square = 0;       // variance of one sample of a pixel
   double change_square = 0;      // mean square of (setting - the one that it is a change of)
@@ -43,29 +46,37 @@ struct AccuracyTable {
   int threads = 0;                   // that the times were measured with
   std::vector<double> sharpness;     // [light] increasing
   std::vector<double> footprint_mm;  // [footprint] edge of a pixel on the cloth, increasing
-  std::vector<double> light_cosine;  // [height of the light] to the normal of the flat cloth, increasing
+  // [height of the light] to the normal of the flat cloth, increasing
+  std::vector<double> light_cosine;
   double bent_footprint_mm = 0;
   double bent_light_cosine = 0;
-  // Light from fold to fold, which the entries of the folded swatch leave out: [light] squared error without it, and the mean square of
-  // what the folds see of each other (enclosure.h). Empty and 0 of surfaces.
+  // Light from fold to fold, which the entries of the folded swatch leave out: [light] squared
+  // error without it, and the mean square of what the folds see of each other (enclosure.h). Empty
+  // and 0 of surfaces.
   std::vector<double> bent_between;
   double bent_enclosure_square = 0;
   Rgbd color = Rgbd::Ones();  // of the flat cloth, relative to the mean of the channels
-  // Radiance of the flat cloth lit from behind, relative to that under the same light from its face; 0 of surfaces, which are alike on both sides.
+  // Radiance of the flat cloth lit from behind, relative to that under the same light from its
+  // face; 0 of surfaces, which are alike on both sides.
   double through = 0;
   std::vector<SettingAccuracy> settings;  // "path" first
-  std::map<std::string, WorkTime> costs;  // of building, by part: "maps", "transfer, cells x 2", ...
+  // of building, by part: "maps", "transfer, cells x 2", ...
+  std::map<std::string, WorkTime> costs;
 
   bool has(const std::string& setting) const;
   const SettingAccuracy& setting(const std::string& name) const;
-  /// Linear in the logarithms of sharpness and footprint, and in the cosine; the nearest entry beyond the ends.
-  Accuracy at(const std::string& setting, double sharpness, double footprint_mm, double light_cosine) const;
+  /// Linear in the logarithms of sharpness and footprint, and in the cosine; the nearest entry
+  /// beyond the ends.
+  Accuracy at(const std::string& setting, double sharpness, double footprint_mm,
+              double light_cosine) const;
   /// The same of the folded swatch.
   Accuracy at_bent(const std::string& setting, double sharpness) const;
   /// bent_between, linear in the logarithm of sharpness; 0 where there is none.
   double between_at(double sharpness) const;
   /// Squared error of the mean colour, part of bias_square: relative to the squared mean radiance.
-  double mean_square(const Rgbd& color_ratio) const { return (color * (color_ratio - 1)).square().mean(); }
+  double mean_square(const Rgbd& color_ratio) const {
+    return (color * (color_ratio - 1)).square().mean();
+  }
 };
 
 nlohmann::ordered_json accuracy_json(const AccuracyTable& table);

@@ -32,20 +32,23 @@ struct ViewAndLight {
   double view_theta, view_phi;
   double light_theta, light_phi;
 };
-// Errors depend on how low the light stands more than on the view: as many pairs of low light as of high.
+// Errors depend on how low the light stands more than on the view: as many pairs of low light as of
+// high.
 constexpr std::size_t kHeights = 2;
 constexpr std::size_t kPairsOfHeight = 4;
 constexpr ViewAndLight kPairs[kHeights * kPairsOfHeight] = {
     {30, 290, 60, 300}, {20, 340, 58, 130}, {70, 260, 65, 80}, {45, 90, 62, 200},    // low light
     {10, 20, 35, 80},   {40, 200, 20, 330}, {65, 150, 30, 20}, {50, 110, 40, 250}};  // high
 
-// Folds: a sine wave along x, slopes up to 35 degrees, unrolled without stretch. Of the size that drapes have; steeper ones (55
-// degrees) are worse than drapes and cylinders are (silk under a lamp: 90 % where a cylinder errs by 16).
+// Folds: a sine wave along x, slopes up to 35 degrees, unrolled without stretch. Of the size that
+// drapes have; steeper ones (55 degrees) are worse than drapes and cylinders are (silk under a
+// lamp: 90 % where a cylinder errs by 16).
 constexpr double kWaveLength = 40;   // mm
 constexpr double kWaveHeight = 4.5;  // mm, of its crests over the middle
 constexpr double kBentSeen = 48;     // mm across the picture
 constexpr double kBentSize = 160;    // mm
-constexpr ViewAndLight kBentPairs[] = {{20, 60, 40, 190}, {45, 320, 55, 100}, {60, 130, 35, 20}, {40, 200, 65, 330}};
+constexpr ViewAndLight kBentPairs[] = {
+    {20, 60, 40, 190}, {45, 320, 55, 100}, {60, 130, 35, 20}, {40, 200, 65, 330}};
 
 Vec3d direction_of(double theta_deg, double phi_deg) {
   const double theta = radians(theta_deg);
@@ -66,7 +69,8 @@ ViewAndLight from_behind(ViewAndLight pair) {
 
 Light light_of(double sharpness, const ViewAndLight& pair) {
   Light light;
-  light.type = sharpness >= kDirectionalSharpness ? LightType::kDirectional : LightType::kSphericalGaussian;
+  light.type =
+      sharpness >= kDirectionalSharpness ? LightType::kDirectional : LightType::kSphericalGaussian;
   light.sharpness = static_cast<float>(sharpness);
   light.axis = direction_of(pair.light_theta, pair.light_phi).cast<float>();
   return light;
@@ -100,7 +104,9 @@ struct Halves {
       std::vector<Rgbd> half;
       for (int y = 0; y < edge; y += 2) {
         for (int x = 0; x < edge; x += 2) {
-          const auto at = [&](int i, int j) { return values[static_cast<std::size_t>((y + j) * edge + x + i)]; };
+          const auto at = [&](int i, int j) {
+            return values[static_cast<std::size_t>((y + j) * edge + x + i)];
+          };
           half.push_back(0.25 * (at(0, 0) + at(1, 0) + at(0, 1) + at(1, 1)));
         }
       }
@@ -118,8 +124,8 @@ struct Halves {
 };
 
 /// [level], each of pixels twice as wide.
-std::vector<Sums> compare(const FrameBuffers& frame, const FrameBuffers& reference, const FrameBuffers& unchanged,
-                          int level_count) {
+std::vector<Sums> compare(const FrameBuffers& frame, const FrameBuffers& reference,
+                          const FrameBuffers& unchanged, int level_count) {
   Halves f(frame);
   Halves r(reference);
   Halves u(unchanged);
@@ -157,7 +163,9 @@ ClothMesh folded_cloth() {
   constexpr int kAcross = 24;
   ClothMesh mesh;
   const double wave_number = 2 * kPi / kWaveLength;
-  const auto slope = [&](double x) { return kWaveHeight * wave_number * std::cos(wave_number * x); };
+  const auto slope = [&](double x) {
+    return kWaveHeight * wave_number * std::cos(wave_number * x);
+  };
   double length = 0;  // along the sheet
   for (int i = 0; i <= kAlong; ++i) {
     const double step = kBentSize / kAlong;
@@ -170,7 +178,9 @@ ClothMesh folded_cloth() {
       mesh.fabric.emplace_back(length, y);
     }
   }
-  const auto vertex = [](int i, int j) { return static_cast<std::uint32_t>(i * (kAcross + 1) + j); };
+  const auto vertex = [](int i, int j) {
+    return static_cast<std::uint32_t>(i * (kAcross + 1) + j);
+  };
   for (int i = 0; i < kAlong; ++i) {
     for (int j = 0; j < kAcross; ++j) {
       mesh.triangles.push_back({vertex(i, j), vertex(i + 1, j), vertex(i + 1, j + 1)});
@@ -182,14 +192,16 @@ ClothMesh folded_cloth() {
 
 class Swatch {
  public:
-  Swatch(const Exemplar& exemplar, std::uint64_t seed, const AccuracyEffort& effort) : seed_(seed), effort_(effort) {
+  Swatch(const Exemplar& exemplar, std::uint64_t seed, const AccuracyEffort& effort)
+      : seed_(seed), effort_(effort) {
     // As wide as the fibers, in the mean over segments.
     double diameter = 0;
     for (std::uint32_t segment = 0; segment < exemplar.segment_count(); ++segment) {
       diameter += 2.0 * static_cast<double>(exemplar.radius_mm[exemplar.segment_fiber[segment]]);
     }
     pixel_mm_ = diameter / static_cast<double>(exemplar.segment_count());
-    const double size = 4 * (effort.pixels * pixel_mm_ + kMargin) + 2 * std::max(exemplar.width_mm, exemplar.height_mm);
+    const double size = 4 * (effort.pixels * pixel_mm_ + kMargin) +
+                        2 * std::max(exemplar.width_mm, exemplar.height_mm);
     ClothConfig cloth;
     cloth.flat_width_mm = size;
     cloth.flat_height_mm = size;
@@ -212,14 +224,16 @@ class Swatch {
     flat_.reset(new ClothScene(make_cloth_scene(config_, {})));
     std::vector<SurfaceCloth> surfaces;
     surfaces.emplace_back(surface.model, folded_cloth());
-    bent_ = std::make_unique<ClothScene>(std::vector<ClothPiece>{}, std::vector<TriangleMesh>{}, std::move(surfaces));
+    bent_ = std::make_unique<ClothScene>(std::vector<ClothPiece>{}, std::vector<TriangleMesh>{},
+                                         std::move(surfaces));
   }
   const ClothScene& scene(bool bent) const { return bent ? *bent_ : *flat_; }
 
   /// Each pair looks at another part of the tile.
   Camera camera(std::size_t pair) const {
     const auto index = static_cast<double>(pair);
-    return square_camera(kPairs[pair], {index * 0.754877 * tile_mm_[0], index * 0.569840 * tile_mm_[1], 0},
+    return square_camera(kPairs[pair],
+                         {index * 0.754877 * tile_mm_[0], index * 0.569840 * tile_mm_[1], 0},
                          effort_.pixels * pixel_mm_, effort_.pixels);
   }
   static Camera bent_camera(std::size_t pair, int pixels) {
@@ -227,7 +241,8 @@ class Swatch {
   }
 
  private:
-  static Camera square_camera(const ViewAndLight& pair, const Vec3d& place, double width_mm, int pixels) {
+  static Camera square_camera(const ViewAndLight& pair, const Vec3d& place, double width_mm,
+                              int pixels) {
     CameraConfig camera;
     camera.look_at = place;
     camera.position = place + kCameraDistance * direction_of(pair.view_theta, pair.view_phi);
@@ -279,14 +294,17 @@ class TableMaker {
     table_.threads = working_threads();
     for (const double sharpness : kSharpnesses) table_.sharpness.push_back(sharpness);
     for (std::size_t height = 0; height < kHeights; ++height) {
-      table_.light_cosine.push_back(mean_cosine(std::span(kPairs).subspan(height * kPairsOfHeight, kPairsOfHeight)));
+      table_.light_cosine.push_back(
+          mean_cosine(std::span(kPairs).subspan(height * kPairsOfHeight, kPairsOfHeight)));
     }
     table_.bent_footprint_mm = kBentSeen / swatch.effort().bent_pixels;
     table_.bent_light_cosine = mean_cosine(kBentPairs);
-    for (int level = 0; level < kLevels; ++level) table_.footprint_mm.push_back(std::ldexp(swatch.pixel_mm(), level));
+    for (int level = 0; level < kLevels; ++level)
+      table_.footprint_mm.push_back(std::ldexp(swatch.pixel_mm(), level));
   }
 
-  /// The first setting, "path", is the reference of all. `change_of`: the setting, added before, that this one is a change of, or none.
+  /// The first setting, "path", is the reference of all. `change_of`: the setting, added before,
+  /// that this one is a change of, or none.
   void add(const std::string& name, const Shoot& shoot, const std::string& change_of = "") {
     SettingAccuracy setting;
     setting.name = name;
@@ -294,9 +312,10 @@ class TableMaker {
     std::size_t shots = 0;
     std::vector<FrameBuffers>& own = frames_[name];
     const std::vector<FrameBuffers>& unchanged = change_of.empty() ? own : frames_.at(change_of);
-    const auto compare_with = [&](std::size_t picture, const Camera& camera, const Light& light, bool bent,
-                                  int levels) {
-      (*progress_)((static_cast<double>(done_) + static_cast<double>(shots) / kShots) / static_cast<double>(steps_));
+    const auto compare_with = [&](std::size_t picture, const Camera& camera, const Light& light,
+                                  bool bent, int levels) {
+      (*progress_)((static_cast<double>(done_) + static_cast<double>(shots) / kShots) /
+                   static_cast<double>(steps_));
       const Shot shot = shoot(camera, {light}, bent);
       own.push_back(shot.frame);
       setting.setup_seconds += shot.setup_seconds;
@@ -309,19 +328,21 @@ class TableMaker {
     for (const double sharpness : kSharpnesses) {
       std::vector<std::vector<Sums>> levels(kLevels);  // [level][pair]
       for (std::size_t pair = 0; pair < std::size(kPairs); ++pair) {
-        const std::vector<Sums> sums =
-            compare_with(picture++, swatch_->camera(pair), light_of(sharpness, kPairs[pair]), false, kLevels);
+        const std::vector<Sums> sums = compare_with(
+            picture++, swatch_->camera(pair), light_of(sharpness, kPairs[pair]), false, kLevels);
         for (std::size_t level = 0; level < kLevels; ++level) levels[level].push_back(sums[level]);
       }
       for (const std::vector<Sums>& of_pairs : levels) {
         for (std::size_t height = 0; height < kHeights; ++height) {
-          setting.entries.push_back(accuracy_of(std::span(of_pairs).subspan(height * kPairsOfHeight, kPairsOfHeight)));
+          setting.entries.push_back(
+              accuracy_of(std::span(of_pairs).subspan(height * kPairsOfHeight, kPairsOfHeight)));
         }
       }
       std::vector<Sums> bent;
       for (std::size_t pair = 0; pair < std::size(kBentPairs); ++pair, ++picture) {
         const Camera camera = Swatch::bent_camera(pair, swatch_->effort().bent_pixels);
-        bent.push_back(compare_with(picture, camera, light_of(sharpness, kBentPairs[pair]), true, 1)[0]);
+        bent.push_back(
+            compare_with(picture, camera, light_of(sharpness, kBentPairs[pair]), true, 1)[0]);
       }
       setting.bent.push_back(accuracy_of(bent));
     }
@@ -347,12 +368,14 @@ class TableMaker {
     }
     double sum = 0;
     for (std::size_t pair = 0; pair < std::size(kBentPairs); ++pair) {
-      sum += mean_square_enclosure(Swatch::bent_camera(pair, swatch_->effort().bent_pixels), swatch_->scene(true));
+      sum += mean_square_enclosure(Swatch::bent_camera(pair, swatch_->effort().bent_pixels),
+                                   swatch_->scene(true));
     }
     table_.bent_enclosure_square = sum / static_cast<double>(std::size(kBentPairs));
   }
 
-  /// Colour of the cloth, and what shines through it: directional light from the face, and from behind. After the reference.
+  /// Colour of the cloth, and what shines through it: directional light from the face, and from
+  /// behind. After the reference.
   void add_through(const Shoot& shoot) {
     Rgbd front = Rgbd::Zero();
     Rgbd behind = Rgbd::Zero();
@@ -381,8 +404,9 @@ class TableMaker {
     return sum;
   }
 
-  /// Mean over pairs of view and light of what is relative to each one's own mean radiance: a scene shows one or few of them. What
-  /// another pair may show differs from the mean by as much as these do from each other.
+  /// Mean over pairs of view and light of what is relative to each one's own mean radiance: a scene
+  /// shows one or few of them. What another pair may show differs from the mean by as much as these
+  /// do from each other.
   static Accuracy accuracy_of(std::span<const Sums> pairs) {
     const auto n = static_cast<double>(pairs.size());
     Accuracy result{0, 0, 0, 0, Rgbd::Zero()};
@@ -397,11 +421,13 @@ class TableMaker {
       result.noise_square += sums.variance * scale / n;
       result.change_square += sums.change * scale / n;
       squares += sums.bias * scale * sums.bias * scale / n;
-      noise += scale * scale * std::max(0.0, sums.bias_squares - sums.bias * sums.bias / sums.count);
+      noise +=
+          scale * scale * std::max(0.0, sums.bias_squares - sums.bias * sums.bias / sums.count);
       picture += sums.picture;
       reference += sums.reference;
     }
-    const double spread = std::max(0.0, squares - result.bias_square * result.bias_square) * n / (n - 1);
+    const double spread =
+        std::max(0.0, squares - result.bias_square * result.bias_square) * n / (n - 1);
     result.bias_square_error = std::sqrt(std::max(spread * (1 + 1 / n), noise / (n * n)));
     result.color_ratio = (reference > 0).select(picture / reference, 1.0);
     return result;
@@ -411,7 +437,8 @@ class TableMaker {
   const AccuracyProgress* progress_;
   std::size_t steps_;
   std::size_t done_ = 0;
-  std::map<std::string, std::vector<FrameBuffers>> frames_;  // of settings: [light][pair, bent pair]
+  // of settings: [light][pair, bent pair]
+  std::map<std::string, std::vector<FrameBuffers>> frames_;
   AccuracyTable table_;
 };
 
@@ -419,8 +446,8 @@ const RenderProgress kSilent = [](double) {};
 
 /// `local`: without light from fold to fold, which the precomputed methods do not claim to compute.
 Shoot paths(const Swatch& swatch, int flat_samples, int max_scatterings, bool local = true) {
-  return [&swatch, flat_samples, max_scatterings, local](const Camera& camera, const std::vector<Light>& lights,
-                                                         bool bent) {
+  return [&swatch, flat_samples, max_scatterings, local](
+             const Camera& camera, const std::vector<Light>& lights, bool bent) {
     const int samples = flat_samples * (bent ? swatch.effort().bent_factor : 1);
     PathTracerSettings settings;
     settings.seed = swatch.seed();
@@ -432,22 +459,26 @@ Shoot paths(const Swatch& swatch, int flat_samples, int max_scatterings, bool lo
     const PathTracer tracer(swatch.scene(bent), materials, lights, Rgb(0, 0, 0), settings);
     shot.setup_seconds = setup.elapsed().seconds;
     const Stopwatch watch;
-    shot.frame = trace_picture(tracer, camera, camera.full_frame(), settings.seed, {samples, {}}, kSilent);
+    shot.frame =
+        trace_picture(tracer, camera, camera.full_frame(), settings.seed, {samples, {}}, kSilent);
     shot.seconds = watch.elapsed().seconds;
     return shot;
   };
 }
 
-Shoot precomputed(const Swatch& swatch, const FabricPack& pack, const PrecomputedSettings& settings) {
-  return [&swatch, &pack, settings](const Camera& camera, const std::vector<Light>& lights, bool bent) {
+Shoot precomputed(const Swatch& swatch, const FabricPack& pack,
+                  const PrecomputedSettings& settings) {
+  return [&swatch, &pack, settings](const Camera& camera, const std::vector<Light>& lights,
+                                    bool bent) {
     Shot shot;
     const FabricPack* packs[] = {&pack};
     const Stopwatch setup;
     const PrecomputedRenderer renderer(swatch.scene(bent), packs, lights, Rgb(0, 0, 0), settings);
     shot.setup_seconds = setup.elapsed().seconds;
     const Stopwatch watch;
-    shot.frame = shade_picture(renderer, camera, camera.full_frame(),
-                               swatch.effort().method_samples * (bent ? swatch.effort().bent_factor : 1), kSilent);
+    shot.frame = shade_picture(
+        renderer, camera, camera.full_frame(),
+        swatch.effort().method_samples * (bent ? swatch.effort().bent_factor : 1), kSilent);
     shot.seconds = watch.elapsed().seconds;
     return shot;
   };
@@ -468,16 +499,17 @@ std::string surface_setting(const std::string& surface) {
   return "surface " + surface;
 }
 
-AccuracyTable measure_accuracy(AccuracyData& data, std::uint64_t seed, const AccuracyProgress& progress,
-                               const AccuracyEffort& effort) {
+AccuracyTable measure_accuracy(AccuracyData& data, std::uint64_t seed,
+                               const AccuracyProgress& progress, const AccuracyEffort& effort) {
   FabricPack& pack = data.pack;
   Swatch swatch(pack.exemplar, seed, effort);
   swatch.use_fibers(std::make_shared<const TileScene>(pack.exemplar));
   const int order = pack.transfer->order;
-  const auto lower_orders =
-      std::count_if(std::begin(kOtherOrders), std::end(kOtherOrders), [&](int other) { return other < order; });
-  TableMaker maker(swatch, 7 + static_cast<std::size_t>(lower_orders) + data.cells.size() + data.voxels.size(),
-                   progress);
+  const auto lower_orders = std::count_if(std::begin(kOtherOrders), std::end(kOtherOrders),
+                                          [&](int other) { return other < order; });
+  TableMaker maker(
+      swatch, 7 + static_cast<std::size_t>(lower_orders) + data.cells.size() + data.voxels.size(),
+      progress);
   const PrecomputedSettings usual{
       .seed = seed, .shadow_sigma_mm = {}, .blend = {}, .transfer_order = {}, .interactive = {}};
   const auto with = [&](auto&& change) {
@@ -489,10 +521,12 @@ AccuracyTable measure_accuracy(AccuracyData& data, std::uint64_t seed, const Acc
   maker.add_through(paths(swatch, effort.path_samples, 0));
   maker.add_between(paths(swatch, effort.path_samples, 0, false));
   maker.add("path-6", paths(swatch, effort.method_samples, 6));
-  maker.add("dual-scattering", with([](auto& settings) { settings.shading = LocalShading::kDualScattering; }));
+  maker.add("dual-scattering",
+            with([](auto& settings) { settings.shading = LocalShading::kDualScattering; }));
   maker.add("exact", precomputed(swatch, pack, usual));
   maker.add("volume", with([](auto& settings) { settings.volume = true; }), "exact");
-  maker.add(kDistanceSetting, with([](auto& settings) { settings.blend = kSignedDistanceOnly; }), "exact");
+  maker.add(kDistanceSetting, with([](auto& settings) { settings.blend = kSignedDistanceOnly; }),
+            "exact");
   maker.add(kGaussiansSetting, with([](auto& settings) { settings.blend = kLobesOnly; }), "exact");
   // Settings of the data: the other data take the place of the pack's while a setting is measured.
   const Transfer own = *pack.transfer;
@@ -508,14 +542,16 @@ AccuracyTable measure_accuracy(AccuracyData& data, std::uint64_t seed, const Acc
   pack.transfer = own;
   for (auto& [factor, volume] : data.voxels) {
     std::swap(*pack.volume, volume);
-    maker.add(voxels_setting(factor), with([](auto& settings) { settings.volume = true; }), "volume");
+    maker.add(voxels_setting(factor), with([](auto& settings) { settings.volume = true; }),
+              "volume");
     std::swap(*pack.volume, volume);
   }
   return maker.take();
 }
 
-AccuracyTable measure_surface_accuracy(const Exemplar& exemplar, const SurfaceFabric& surface, std::uint64_t seed,
-                                       const AccuracyProgress& progress, const AccuracyEffort& effort) {
+AccuracyTable measure_surface_accuracy(const Exemplar& exemplar, const SurfaceFabric& surface,
+                                       std::uint64_t seed, const AccuracyProgress& progress,
+                                       const AccuracyEffort& effort) {
   Swatch swatch(exemplar, seed, effort);
   TableMaker maker(swatch, 2, progress);
   swatch.use_fibers(std::make_shared<const TileScene>(exemplar));

@@ -36,14 +36,16 @@ const char* visibility_of(const Way& way, const Light& light) {
 
 std::string light_name(const Light& light) {
   if (light.type == LightType::kEnvironment) return "environment";
-  return light.is_directional() ? "directional" : fmt::format("sg, sharpness {:g}", light.sharpness);
+  return light.is_directional() ? "directional"
+                                : fmt::format("sg, sharpness {:g}", light.sharpness);
 }
 
 /// How a way draws a cloth.
 Json cloth_json(const ScenePlan& plan, const Way& way, std::size_t k) {
   const ClothConfig& cloth = plan.scene.cloths[k];
   if (cloth.surface) return {{"drawn_by", "surface"}, {"surface", cloth.surface->name}};
-  if (way.variant.stand_ins.contains(k)) return {{"drawn_by", "surface"}, {"surface", cloth.far_surface->name}};
+  if (way.variant.stand_ins.contains(k))
+    return {{"drawn_by", "surface"}, {"surface", cloth.far_surface->name}};
   Json json = {{"drawn_by", "fibers"}, {"fabric", cloth.fabric.generic_string()}};
   if (!is_precomputed(way.method)) return json;
   const SceneVariant::OfFabric of = way.variant.of(cloth.fabric);
@@ -55,16 +57,20 @@ Json cloth_json(const ScenePlan& plan, const Way& way, std::size_t k) {
 
 std::string cloth_text(const ScenePlan& plan, const Way& way, std::size_t k) {
   const Json json = cloth_json(plan, way, k);
-  if (json.at("drawn_by") == "surface") return "surface model " + json.at("surface").get<std::string>();
+  if (json.at("drawn_by") == "surface")
+    return "surface model " + json.at("surface").get<std::string>();
   std::string text = "fibers";
   if (!is_precomputed(way.method)) return text;
   text += fmt::format(", cells x {:g}", json.at("cell_size").get<double>());
-  text += json.at("order").is_null() ? ", the fabric's order" : fmt::format(", order {}", json.at("order").get<int>());
-  if (json.contains("voxel_rate")) text += fmt::format(", voxels x {:g}", json.at("voxel_rate").get<double>());
+  text += json.at("order").is_null() ? ", the fabric's order"
+                                     : fmt::format(", order {}", json.at("order").get<int>());
+  if (json.contains("voxel_rate"))
+    text += fmt::format(", voxels x {:g}", json.at("voxel_rate").get<double>());
   return text;
 }
 
-/// The cheapest way of each family for this tolerance, or the most accurate where none meets it; the chosen one first.
+/// The cheapest way of each family for this tolerance, or the most accurate where none meets it;
+/// the chosen one first.
 std::vector<const Way*> notable(const ScenePlan& plan) {
   std::vector<const Way*> list;
   if (plan.chosen) list.push_back(&plan.ways[*plan.chosen]);
@@ -79,7 +85,8 @@ std::vector<const Way*> notable(const ScenePlan& plan) {
       const auto b = offer(best->candidate, plan.question.tolerance, plan.question.pictures);
       if (a && b ? a->seconds < b->seconds
                  : a.has_value() > b.has_value() ||
-                       (!a && !b && other.candidate.bias_square.value < best->candidate.bias_square.value)) {
+                       (!a && !b &&
+                        other.candidate.bias_square.value < best->candidate.bias_square.value)) {
         best = &other;
       }
     }
@@ -122,43 +129,50 @@ std::string why(const ScenePlan& plan, const Way& way) {
 
 std::string plan_text(const ScenePlan& plan) {
   const PlanQuestion& question = plan.question;
-  std::string text =
-      fmt::format("plan      {}{}, relative RMSE at most {}, {}\n", plan.scene.name,
-                  question.view.empty() ? "" : ", view " + question.view, percent(question.tolerance),
-                  question.pictures == 1 ? "one picture" : fmt::format("{} pictures", question.pictures));
+  std::string text = fmt::format(
+      "plan      {}{}, relative RMSE at most {}, {}\n", plan.scene.name,
+      question.view.empty() ? "" : ", view " + question.view, percent(question.tolerance),
+      question.pictures == 1 ? "one picture" : fmt::format("{} pictures", question.pictures));
   if (plan.chosen) {
     const Way& way = plan.ways[*plan.chosen];
-    text += fmt::format("choice    {}, {} samples per pixel\n", way.candidate.name, plan.offer->spp);
+    text +=
+        fmt::format("choice    {}, {} samples per pixel\n", way.candidate.name, plan.offer->spp);
     for (std::size_t k = 0; k < plan.scene.cloths.size(); ++k) {
       const SeenCloth& seen = plan.seen[k];
       text += fmt::format("cloth {:<3} {}", k + 1, cloth_text(plan, way, k));
-      text += seen.share > 0 ? fmt::format(" ({:.0f} % of the picture, a pixel covers {:.3g} mm)\n", 100 * seen.share,
-                                           seen.footprint_mm)
+      text += seen.share > 0 ? fmt::format(" ({:.0f} % of the picture, a pixel covers {:.3g} mm)\n",
+                                           100 * seen.share, seen.footprint_mm)
                              : "\n";
     }
     for (std::size_t l = 0; l < plan.scene.lights.size() && is_precomputed(way.method); ++l) {
       const Light& light = plan.scene.lights[l];
-      text += fmt::format("light {:<3} {}: visibility by {}\n", l + 1, light_name(light), visibility_of(way, light));
+      text += fmt::format("light {:<3} {}: visibility by {}\n", l + 1, light_name(light),
+                          visibility_of(way, light));
     }
     text += fmt::format("error     {} expected: {} apart from noise ({}), {} noise\n",
-                        percent(plan.offer->expected_error), percent(root(way.candidate.bias_square.value)),
+                        percent(plan.offer->expected_error),
+                        percent(root(way.candidate.bias_square.value)),
                         traces_paths(way.method) && way.family == "path" ? "none by definition"
-                        : way.tried                                    ? "table and pilot"
+                        : way.tried                                      ? "table and pilot"
                                                                          : "table",
                         percent(root(way.candidate.noise_square.value / plan.offer->spp)));
-    text += fmt::format("cost      {}: {} to build, {} per picture; the plan took {}\n",
-                        seconds_text(plan.offer->seconds), seconds_text(way.candidate.build_seconds),
-                        seconds_text(plan.offer->seconds_per_picture), seconds_text(plan.time.seconds));
+    text +=
+        fmt::format("cost      {}: {} to build, {} per picture; the plan took {}\n",
+                    seconds_text(plan.offer->seconds), seconds_text(way.candidate.build_seconds),
+                    seconds_text(plan.offer->seconds_per_picture), seconds_text(plan.time.seconds));
   } else {
-    text += fmt::format("choice    none: no way meets this tolerance; the best that can be had is {}\n",
-                        percent(plan.best_tolerance));
+    text +=
+        fmt::format("choice    none: no way meets this tolerance; the best that can be had is {}\n",
+                    percent(plan.best_tolerance));
   }
   const char* label = "why";
   for (const Way* way : notable(plan)) {
-    text += fmt::format("{:<9} {}: apart from noise {}, noise {} / sqrt(spp), {} per spp, {} to build: {}\n", label,
-                        way->candidate.name, percent(root(way->candidate.bias_square.value)),
-                        percent(root(way->candidate.noise_square.value)), seconds_text(way->candidate.seconds_per_spp),
-                        seconds_text(way->candidate.build_seconds), why(plan, *way));
+    text += fmt::format(
+        "{:<9} {}: apart from noise {}, noise {} / sqrt(spp), {} per spp, {} to build: {}\n", label,
+        way->candidate.name, percent(root(way->candidate.bias_square.value)),
+        percent(root(way->candidate.noise_square.value)),
+        seconds_text(way->candidate.seconds_per_spp), seconds_text(way->candidate.build_seconds),
+        why(plan, *way));
     label = "";
   }
   if (!plan.note.empty()) text += fmt::format("note      {}\n", plan.note);
@@ -179,18 +193,21 @@ Json plan_json(const ScenePlan& plan) {
                {"plan_core_seconds", plan.time.core_seconds}};
   json["seen"] = Json::array();
   for (const SeenCloth& seen : plan.seen) {
-    json["seen"].push_back(
-        {{"share", seen.share}, {"light_share", seen.light_share}, {"footprint_mm", seen.footprint_mm}});
+    json["seen"].push_back({{"share", seen.share},
+                            {"light_share", seen.light_share},
+                            {"footprint_mm", seen.footprint_mm}});
   }
   json["choice"] = nullptr;
   if (plan.chosen) {
     const Way& way = plan.ways[*plan.chosen];
     Json& choice = json["choice"] = way_json(plan, way);
     choice["cloths"] = Json::array();
-    for (std::size_t k = 0; k < plan.scene.cloths.size(); ++k) choice["cloths"].push_back(cloth_json(plan, way, k));
+    for (std::size_t k = 0; k < plan.scene.cloths.size(); ++k)
+      choice["cloths"].push_back(cloth_json(plan, way, k));
     choice["lights"] = Json::array();
     for (const Light& light : plan.scene.lights) {
-      choice["lights"].push_back({{"light", light_name(light)}, {"visibility", visibility_of(way, light)}});
+      choice["lights"].push_back(
+          {{"light", light_name(light)}, {"visibility", visibility_of(way, light)}});
     }
   }
   json["note"] = plan.note;

@@ -8,8 +8,8 @@
 namespace heddle {
 namespace {
 
-// Standard errors added to what a candidate is thought to err by. More would turn away fast methods whose error is near the
-// tolerance, at a high price; less would miss it.
+// Standard errors added to what a candidate is thought to err by. More would turn away fast methods
+// whose error is near the tolerance, at a high price; less would miss it.
 constexpr double kCaution = 0.25;
 // Share of the squared tolerance that is aimed at: the noise of a picture is itself uncertain.
 constexpr double kAim = 0.89;
@@ -18,16 +18,18 @@ constexpr double kAim = 0.89;
 constexpr double kOptimism = 0.7;
 // Standard errors more at which it is worth looking twice.
 constexpr double kDoubt = 2;
-// More caution of the bias is taken as long as noise keeps this share of its room: that many more samples at most.
+// More caution of the bias is taken as long as noise keeps this share of its room: that many more
+// samples at most.
 constexpr double kMoreCaution = 1;
 constexpr double kRoomKept = 0.88;
 
-// What is known, or errs less apart from noise, may cost so much more: what is not known may be worse than thought, and noise alone can be
-// mended.
+// What is known, or errs less apart from noise, may cost so much more: what is not known may be
+// worse than thought, and noise alone can be mended.
 constexpr double kLittleMore = 1.25;
 // Squared errors that differ by this share of the squared tolerance are alike.
 constexpr double kLittleBias = 0.02;
-// Of a pilot of few of the picture's pixels, relative: a few pixels hold most of the squares, and it misses more of them than it meets.
+// Of a pilot of few of the picture's pixels, relative: a few pixels hold most of the squares, and
+// it misses more of them than it meets.
 constexpr double kPilotError = 0.4;
 
 double cautious(const Estimate& square, double caution = kCaution) {
@@ -52,14 +54,15 @@ int in_steps(double samples, int step) {
 
 std::optional<Offer> offer(const Candidate& candidate, double tolerance, int pictures) {
   const double left = room(candidate, tolerance);
-  const double needed = left > 0 ? cautious(candidate.noise_square) / left : std::numeric_limits<double>::infinity();
+  const double needed =
+      left > 0 ? cautious(candidate.noise_square) / left : std::numeric_limits<double>::infinity();
   if (!(needed <= kMostSamples)) return {};
   Offer result;
   result.spp = in_steps(needed, candidate.spp_step);
   result.seconds_per_picture = candidate.setup_seconds + result.spp * candidate.seconds_per_spp;
   result.seconds = candidate.build_seconds + pictures * result.seconds_per_picture;
-  result.expected_error =
-      std::sqrt(std::max(0.0, candidate.bias_square.value) + std::max(0.0, candidate.noise_square.value) / result.spp);
+  result.expected_error = std::sqrt(std::max(0.0, candidate.bias_square.value) +
+                                    std::max(0.0, candidate.noise_square.value) / result.spp);
   return result;
 }
 
@@ -69,10 +72,12 @@ bool may_miss(const Candidate& candidate, double tolerance) {
 
 int first_samples(const Candidate& candidate, double tolerance) {
   const double left = room(candidate, tolerance);
-  return left > 0 ? in_steps(std::max(2.0, candidate.noise_square.value / left), candidate.spp_step) : 2;
+  return left > 0 ? in_steps(std::max(2.0, candidate.noise_square.value / left), candidate.spp_step)
+                  : 2;
 }
 
-int more_samples(const Candidate& candidate, const Estimate& noise_square, int done, double tolerance) {
+int more_samples(const Candidate& candidate, const Estimate& noise_square, int done,
+                 double tolerance) {
   const double left = room(candidate, tolerance);
   if (!(left > 0)) return 0;
   const double needed = cautious(noise_square) / left;
@@ -80,7 +85,8 @@ int more_samples(const Candidate& candidate, const Estimate& noise_square, int d
   return in_steps(std::min(needed, 2.0 * done) - done, candidate.spp_step);
 }
 
-std::optional<std::size_t> cheapest(std::span<const Candidate> candidates, double tolerance, int pictures) {
+std::optional<std::size_t> cheapest(std::span<const Candidate> candidates, double tolerance,
+                                    int pictures) {
   std::optional<std::size_t> best;
   double seconds = 0;
   for (std::size_t k = 0; k < candidates.size(); ++k) {
@@ -92,11 +98,13 @@ std::optional<std::size_t> cheapest(std::span<const Candidate> candidates, doubl
   return best;
 }
 
-std::optional<std::size_t> cheapest_known(std::span<const Candidate> candidates, const std::vector<bool>& known,
-                                          double tolerance, int pictures) {
+std::optional<std::size_t> cheapest_known(std::span<const Candidate> candidates,
+                                          const std::vector<bool>& known, double tolerance,
+                                          int pictures) {
   const std::optional<std::size_t> cheapest_of_all = cheapest(candidates, tolerance, pictures);
   if (!cheapest_of_all) return {};
-  const double most_seconds = kLittleMore * offer(candidates[*cheapest_of_all], tolerance, pictures)->seconds;
+  const double most_seconds =
+      kLittleMore * offer(candidates[*cheapest_of_all], tolerance, pictures)->seconds;
   std::vector<std::size_t> rivals;
   bool any_known = false;
   for (std::size_t k = 0; k < candidates.size(); ++k) {
@@ -106,10 +114,14 @@ std::optional<std::size_t> cheapest_known(std::span<const Candidate> candidates,
     any_known = any_known || known[k];
   }
   if (any_known) std::erase_if(rivals, [&](std::size_t k) { return !known[k]; });
-  const auto bias = [&](std::size_t k) { return cautious(candidates[k].bias_square, kMoreCaution); };
-  const double least = bias(
-      *std::min_element(rivals.begin(), rivals.end(), [&](std::size_t a, std::size_t b) { return bias(a) < bias(b); }));
-  std::erase_if(rivals, [&](std::size_t k) { return bias(k) > least + kLittleBias * tolerance * tolerance; });
+  const auto bias = [&](std::size_t k) {
+    return cautious(candidates[k].bias_square, kMoreCaution);
+  };
+  const double least =
+      bias(*std::min_element(rivals.begin(), rivals.end(),
+                             [&](std::size_t a, std::size_t b) { return bias(a) < bias(b); }));
+  std::erase_if(
+      rivals, [&](std::size_t k) { return bias(k) > least + kLittleBias * tolerance * tolerance; });
   const auto rank = [&](std::size_t k) {
     return std::pair(candidates[k].changes, offer(candidates[k], tolerance, pictures)->seconds);
   };
@@ -133,7 +145,8 @@ Estimate at_best(const Estimate& square) {
 }
 
 Estimate weighed(Estimate thought, Estimate measured, double unseen) {
-  // No square is negative: what is below 0 is noise, however little of it the pilot thinks that it has.
+  // No square is negative: what is below 0 is noise, however little of it the pilot thinks that it
+  // has.
   measured.error = std::max(measured.error, -measured.value);
   const double square = std::max(thought.value, measured.value - measured.error);
   thought.error = std::max(thought.error, kTableError * square);
@@ -145,8 +158,9 @@ Estimate alike(const Estimate& thought, const Estimate& like_thought, const Esti
   const double value = like_seen.value >= like_thought.value || !(like_thought.value > 0)
                            ? thought.value + like_seen.value - like_thought.value
                            : thought.value * std::max(0.0, like_seen.value) / like_thought.value;
-  return {value, std::min(std::hypot(like_seen.error, kTableError * (thought.value - like_thought.value)),
-                          std::hypot(thought.error, kTableError * (value - thought.value)))};
+  return {value,
+          std::min(std::hypot(like_seen.error, kTableError * (thought.value - like_thought.value)),
+                   std::hypot(thought.error, kTableError * (value - thought.value)))};
 }
 
 Estimate combined(const Estimate& a, const Estimate& b) {
@@ -154,7 +168,8 @@ Estimate combined(const Estimate& a, const Estimate& b) {
   if (!(b.error > 0)) return b;
   const double weight_a = 1 / (a.error * a.error);
   const double weight_b = 1 / (b.error * b.error);
-  return {(weight_a * a.value + weight_b * b.value) / (weight_a + weight_b), 1 / std::sqrt(weight_a + weight_b)};
+  return {(weight_a * a.value + weight_b * b.value) / (weight_a + weight_b),
+          1 / std::sqrt(weight_a + weight_b)};
 }
 
 }  // namespace heddle

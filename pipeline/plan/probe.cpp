@@ -42,14 +42,16 @@ std::vector<PixelRect> spread_blocks(const PixelRect& rectangle, int edge, int p
   const int down = (rectangle.height + edge - 1) / edge;
   std::vector<int> order(static_cast<std::size_t>(across * down));
   std::iota(order.begin(), order.end(), 0);
-  // Additive recurrences with the plastic number spread points evenly over a square, and any share of them too.
+  // Additive recurrences with the plastic number spread points evenly over a square, and any share
+  // of them too.
   constexpr double kStepX = 0.7548776662466927;
   constexpr double kStepY = 0.5698402909980532;
   const auto rank = [&](int k) {
     const double value = k % across * kStepX + k / across * kStepY;
     return value - std::floor(value);
   };
-  const int wanted = std::max(1, static_cast<int>(std::lround(static_cast<double>(pixels) / (edge * edge))));
+  const int wanted =
+      std::max(1, static_cast<int>(std::lround(static_cast<double>(pixels) / (edge * edge))));
   if (wanted < across * down) {
     std::sort(order.begin(), order.end(), [&](int a, int b) { return rank(a) < rank(b); });
     order.resize(static_cast<std::size_t>(wanted));
@@ -59,7 +61,8 @@ std::vector<PixelRect> spread_blocks(const PixelRect& rectangle, int edge, int p
   for (const int k : order) {
     const int left = k % across * edge;
     const int top = k / across * edge;
-    blocks.push_back({rectangle.x0 + left, rectangle.y0 + top, std::min(edge, rectangle.width - left),
+    blocks.push_back({rectangle.x0 + left, rectangle.y0 + top,
+                      std::min(edge, rectangle.width - left),
                       std::min(edge, rectangle.height - top)});
   }
   return blocks;
@@ -67,7 +70,9 @@ std::vector<PixelRect> spread_blocks(const PixelRect& rectangle, int edge, int p
 
 double mean_radiance(std::span<const FrameBuffers> blocks) {
   return mean_over_pixels(blocks,
-                          [&](std::size_t b, std::size_t k) { return static_cast<double>(blocks[b].beauty[k].mean()); })
+                          [&](std::size_t b, std::size_t k) {
+                            return static_cast<double>(blocks[b].beauty[k].mean());
+                          })
       .value;
 }
 
@@ -78,7 +83,9 @@ Estimate sample_variance(std::span<const FrameBuffers> blocks) {
 }
 
 Estimate sample_variance_of_all(const FrameBuffers& frame) {
-  const auto variance = [&](std::size_t k) { return frame.spp * static_cast<double>(frame.variance[k].mean()); };
+  const auto variance = [&](std::size_t k) {
+    return frame.spp * static_cast<double>(frame.variance[k].mean());
+  };
   double sum = 0;
   double squares = 0;
   for (std::size_t k = 0; k < frame.pixel_count(); ++k) {
@@ -91,7 +98,8 @@ Estimate sample_variance_of_all(const FrameBuffers& frame) {
   return {sum / count, std::sqrt(squares) / count};
 }
 
-Estimate squared_bias_of_means(std::span<const FrameBuffers> blocks, std::span<const FrameBuffers> reference) {
+Estimate squared_bias_of_means(std::span<const FrameBuffers> blocks,
+                               std::span<const FrameBuffers> reference) {
   assert(blocks.size() == reference.size());
   std::vector<double> sums;
   std::vector<double> pixels;
@@ -108,7 +116,8 @@ Estimate squared_bias_of_means(std::span<const FrameBuffers> blocks, std::span<c
   return mean_of(sums, pixels);
 }
 
-Estimate squared_bias(std::span<const FrameBuffers> blocks, std::span<const FrameBuffers> reference) {
+Estimate squared_bias(std::span<const FrameBuffers> blocks,
+                      std::span<const FrameBuffers> reference) {
   assert(blocks.size() == reference.size());
   return mean_over_pixels(blocks, [&](std::size_t b, std::size_t k) {
     const Rgbd d0 = (blocks[b].half0[k] - reference[b].half0[k]).cast<double>();

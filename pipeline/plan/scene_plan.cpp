@@ -18,37 +18,44 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// The pilot's pixels come in blocks of this edge: neighbours share cache lines, and blocks tell how much the picture varies.
+// The pilot's pixels come in blocks of this edge: neighbours share cache lines, and blocks tell how
+// much the picture varies.
 constexpr int kBlockEdge = 8;
 // Of the first pilot; less of a small picture.
 constexpr int kFirstPixels = 2048;
 constexpr int kPilotSamples = 2;
-// A pilot of the chosen way may take this share of its pictures' time if its noise is not known well enough before.
+// A pilot of the chosen way may take this share of its pictures' time if its noise is not known
+// well enough before.
 constexpr double kPilotShare = 0.08;
 constexpr double kNoiseKnown = 0.08;  // relative standard error
 // Pilots, of paths or of ways, before the plan settles for what is known.
 constexpr int kMostTries = 16;
 // A way is tried where that takes at most this share of the time of what it offers.
 constexpr double kTryShare = 0.2;
-// Where a way would take at most this share of the time of the one that is sure to be good enough, it is worth finding out more of it.
+// Where a way would take at most this share of the time of the one that is sure to be good enough,
+// it is worth finding out more of it.
 constexpr double kHope = 0.5;
-// Where what is chosen may well miss the tolerance, finding out more of it may take this share of what it offers.
+// Where what is chosen may well miss the tolerance, finding out more of it may take this share of
+// what it offers.
 constexpr double kDoubtShare = 0.25;
 // Building its data and trying it may take this share of what it may save.
 constexpr double kBuildShare = 0.25;
-// Light from one cloth to another is known well enough if its squared error is this share of the squared tolerance, or less.
+// Light from one cloth to another is known well enough if its squared error is this share of the
+// squared tolerance, or less.
 constexpr double kBetweenKnown = 0.05;
-// Light between cloths by what they see of each other, relative to the folds of a table: long valleys give each other more than what
-// drapes and things side by side do. One standard error of it.
+// Light between cloths by what they see of each other, relative to the folds of a table: long
+// valleys give each other more than what drapes and things side by side do. One standard error of
+// it.
 constexpr double kBetweenOfFolds = 0.6;
 constexpr double kBetweenError = 0.6;
 // Of the mean that a fast way makes of the picture, relative, beside what is thought of it.
 constexpr double kMeanError = 0.07;
-// A pilot tells nothing if its standard error is more than this many of what is known, and enough if it is less than the second.
+// A pilot tells nothing if its standard error is more than this many of what is known, and enough
+// if it is less than the second.
 constexpr double kTelling = 0.8;
 constexpr double kTold = 0.6;
-// Standard errors added to a pilot's squared error where it says less than was thought: it misses rare large squares more often than it
-// meets them.
+// Standard errors added to a pilot's squared error where it says less than was thought: it misses
+// rare large squares more often than it meets them.
 constexpr double kDoubtOfLess = 0.7;
 // A pilot of all pixels has not seen all that their samples may show.
 constexpr double kLeastUnseen = 0.25;
@@ -58,8 +65,8 @@ constexpr double kMostStress = 4;
 constexpr std::uint64_t kPilotSeed = 0x9107;
 // Fabrics of one scene whose settings are chosen apart: there are up to 6 choices for each.
 constexpr std::size_t kMostApart = 3;
-// Path-traced samples in the time that an accuracy table takes, its own data left out (measure_accuracy.h): where a plan needs
-// fewer in all, path tracing is cheaper than finding out.
+// Path-traced samples in the time that an accuracy table takes, its own data left out
+// (measure_accuracy.h): where a plan needs fewer in all, path tracing is cheaper than finding out.
 constexpr double kTableSamples = 4e6;
 
 /// What a fabric's tables and stages say; one per fabric file.
@@ -79,8 +86,8 @@ struct LightShare {
   double cosine;  // to the cloth's normal, mean over what is seen
 };
 
-/// A squared error over lights of these weights: half as if errors were the same everywhere, half as if they had nothing to do with each
-/// other.
+/// A squared error over lights of these weights: half as if errors were the same everywhere, half
+/// as if they had nothing to do with each other.
 class OverLights {
  public:
   void add(double weight, double square) {
@@ -112,7 +119,8 @@ class ScenePlanner {
     plan_.question = question;
     plan_.scene = job_->config();
     plan_.request = job_->request(find_view(plan_.scene, question.view));
-    if (!question.crop.empty()) plan_.request.crop = parse_crop(question.crop, plan_.request.camera);
+    if (!question.crop.empty())
+      plan_.request.crop = parse_crop(question.crop, plan_.request.camera);
     const PixelRect& crop = plan_.request.crop;
     pixels_ = static_cast<double>(crop.width) * crop.height;
   }
@@ -120,7 +128,8 @@ class ScenePlanner {
   ScenePlan make() {
     job_->fibers_scene();
     const Stopwatch watch;
-    const int first = static_cast<int>(std::clamp(pixels_ / 4, 256.0, static_cast<double>(kFirstPixels)));
+    const int first =
+        static_cast<int>(std::clamp(pixels_ / 4, 256.0, static_cast<double>(kFirstPixels)));
     trace_pilot(first, kPilotSamples);
     look_at_cloths();
     add_path();
@@ -134,7 +143,8 @@ class ScenePlanner {
   }
 
  private:
-  // --- The pilot -------------------------------------------------------------------------------------------------------------
+  // --- The pilot
+  // -----------------------------------------------------------------------------------------------
 
   PictureRequest pilot_request(RenderMethod method, int spp) const {
     PictureRequest request = plan_.request;
@@ -144,7 +154,8 @@ class ScenePlanner {
     return request;
   }
 
-  SceneJob::Crops shoot(SceneJob& job, const PictureRequest& request, std::optional<int> transfer_order = {}) {
+  SceneJob::Crops shoot(SceneJob& job, const PictureRequest& request,
+                        std::optional<int> transfer_order = {}) {
     const Stopwatch watch;
     SceneJob::Crops crops = job.render_crops(request, blocks_, transfer_order);
     loading_ = loading_ + (watch.elapsed() - crops.setup - crops.rendering);
@@ -153,7 +164,8 @@ class ScenePlanner {
 
   double seconds_per_spp(const SceneJob::Crops& crops, int spp) const {
     double pixels = 0;
-    for (const FrameBuffers& frame : crops.frames) pixels += static_cast<double>(frame.pixel_count());
+    for (const FrameBuffers& frame : crops.frames)
+      pixels += static_cast<double>(frame.pixel_count());
     return crops.rendering.seconds / (pixels * spp) * pixels_;
   }
 
@@ -163,7 +175,8 @@ class ScenePlanner {
     paths_ = crops.frames;
     path_spp_ = spp;
     pilot_pixels_ = 0;
-    for (const FrameBuffers& frame : paths_) pilot_pixels_ += static_cast<double>(frame.pixel_count());
+    for (const FrameBuffers& frame : paths_)
+      pilot_pixels_ += static_cast<double>(frame.pixel_count());
     path_setup_ = crops.setup.seconds;
     path_seconds_per_spp_ = seconds_per_spp(crops, spp);
     path_variance_ = sample_variance(paths_);
@@ -178,8 +191,8 @@ class ScenePlanner {
     return cloths.size() > 1 || !plan_.scene.meshes.empty() || cloths[0].mesh;
   }
 
-  /// The same paths without what they meet beyond the cloth that they leave. All that methods lack which end light there; light
-  /// from afar is smooth.
+  /// The same paths without what they meet beyond the cloth that they leave. All that methods lack
+  /// which end light there; light from afar is smooth.
   void trace_local() {
     if (!sends_light_about() || !local_paths_.empty()) return;
     PictureRequest local = pilot_request(RenderMethod::kPath, path_spp_);
@@ -188,7 +201,8 @@ class ScenePlanner {
     light_between_mean_ = mean_.value > 0 ? mean_radiance(local_paths_) / mean_.value - 1 : 0;
     light_between_ = relative(squared_bias_of_means(local_paths_, paths_));
     // The mean's part of it is known best.
-    light_between_.value = std::max(light_between_.value, light_between_mean_ * light_between_mean_);
+    light_between_.value =
+        std::max(light_between_.value, light_between_mean_ * light_between_mean_);
     if (const Estimate thought = thought_between(); thought.value > 0) {
       // Few of the paths carry it, and few paths may have met none of those.
       const double noise = mean_.value > 0 ? mean_.error / mean_.value : 1;
@@ -205,8 +219,10 @@ class ScenePlanner {
       const AccuracyTable& table = *fabric_of(plan_.scene.cloths[k].fabric)->table;
       if (!(table.bent_enclosure_square > 0)) continue;
       double of_folds = 0;
-      for (const LightShare& light : lights_of_cloth_[k]) of_folds += light.weight * table.between_at(light.sharpness);
-      square += weight_of(k) * kBetweenOfFolds * of_folds * enclosure_square_[k] / table.bent_enclosure_square;
+      for (const LightShare& light : lights_of_cloth_[k])
+        of_folds += light.weight * table.between_at(light.sharpness);
+      square += weight_of(k) * kBetweenOfFolds * of_folds * enclosure_square_[k] /
+                table.bent_enclosure_square;
     }
     return {square, kBetweenError * square};
   }
@@ -214,8 +230,8 @@ class ScenePlanner {
     return !traces_paths(way.method) || !way.variant.stand_ins.empty();
   }
 
-  /// The error of a way by the tables and by light between cloths: from that against what it claims to compute and from what it does not
-  /// claim.
+  /// The error of a way by the tables and by light between cloths: from that against what it claims
+  /// to compute and from what it does not claim.
   Estimate thought_of(const Way& way) const {
     Estimate thought = way.bias_square;
     if (lacks_light_between(way)) {
@@ -250,18 +266,21 @@ class ScenePlanner {
         continue;
       }
       const Way& like = plan_.ways[of_kind->second];
-      way.candidate.bias_square = &like == &way ? seen_of(way) : alike(thought, thought_of(like), seen_of(like));
+      way.candidate.bias_square =
+          &like == &way ? seen_of(way) : alike(thought, thought_of(like), seen_of(like));
     }
   }
 
   /// An absolute square relative to the mean radiance; the mean's own error counts.
   Estimate relative(const Estimate& square) const {
     const double scale = mean_.value > 0 ? 1 / (mean_.value * mean_.value) : 0;
-    const double of_mean = mean_.value > 0 ? 2 * std::min(1.0, mean_.error / mean_.value) * square.value : 0;
+    const double of_mean =
+        mean_.value > 0 ? 2 * std::min(1.0, mean_.error / mean_.value) * square.value : 0;
     return {square.value * scale, std::hypot(square.error, of_mean) * scale};
   }
 
-  // --- The scene -------------------------------------------------------------------------------------------------------------
+  // --- The scene
+  // -----------------------------------------------------------------------------------------------
 
   void look_at_cloths() {
     const SceneConfig& scene = plan_.scene;
@@ -276,14 +295,16 @@ class ScenePlanner {
     }
     const ClothScene& fibers = job_->fibers_scene();
     const Camera camera(plan_.request.camera);
-    std::vector<std::vector<double>> facing(scene.cloths.size(), std::vector<double>(lights_.size(), 0.0));
+    std::vector<std::vector<double>> facing(scene.cloths.size(),
+                                            std::vector<double>(lights_.size(), 0.0));
     double all_light = 0;
     for (std::size_t b = 0; b < blocks_.size(); ++b) {
       for (int k = 0; k < blocks_[b].width * blocks_[b].height; ++k) {
-        const double light = static_cast<double>(paths_[b].beauty[static_cast<std::size_t>(k)].mean());
+        const double light =
+            static_cast<double>(paths_[b].beauty[static_cast<std::size_t>(k)].mean());
         all_light += light;
-        const EyeRay ray =
-            camera.ray(blocks_[b].x0 + k % blocks_[b].width + 0.5, blocks_[b].y0 + k / blocks_[b].width + 0.5);
+        const EyeRay ray = camera.ray(blocks_[b].x0 + k % blocks_[b].width + 0.5,
+                                      blocks_[b].y0 + k / blocks_[b].width + 0.5);
         const std::optional<ShellHit> hit = fibers.first_fiber({ray.origin, ray.direction});
         if (!hit || fibers.meets_mesh(ray.origin, ray.direction, hit->t)) continue;
         const std::size_t cloth = cloth_of_fibers[hit->cloth];
@@ -296,10 +317,12 @@ class ScenePlanner {
         PixelLight& on_pixel = pixel_lights_[cloth].emplace_back();
         const bool sees_face = fibers.fabric_direction(*hit, -ray.direction).z() > 0;
         for (std::size_t l = 0; l < lights_.size(); ++l) {
-          const double height = static_cast<double>(fibers.fabric_direction(*hit, lights_[l].axis).z());
+          const double height =
+              static_cast<double>(fibers.fabric_direction(*hit, lights_[l].axis).z());
           facing[cloth][l] += std::max(0.0, height);
           const bool on_face = height > 0;
-          const Shell::SurfacePoint lit = fibers.surface_point(*hit, on_face ? ClothSide::kFace : ClothSide::kBack);
+          const Shell::SurfacePoint lit =
+              fibers.surface_point(*hit, on_face ? ClothSide::kFace : ClothSide::kBack);
           if (!fibers.globally_visible(lit, lights_[l].axis)) continue;
           PixelLight::OnSide& side = on_face ? on_pixel.face : on_pixel.back;
           (on_face == sees_face ? side.seen : side.across) +=
@@ -315,20 +338,23 @@ class ScenePlanner {
       double all = 0;
       for (std::size_t l = 0; l < lights_.size(); ++l) {
         // Soft light comes from beside its axis too.
-        const double weight =
-            static_cast<double>(lights_[l].irradiance.mean()) * std::max(0.05, facing[cloth][l] / seen.share);
-        const double sharpness =
-            lights_[l].is_directional() ? kDirectionalSharpness : static_cast<double>(lights_[l].sharpness);
+        const double weight = static_cast<double>(lights_[l].irradiance.mean()) *
+                              std::max(0.05, facing[cloth][l] / seen.share);
+        const double sharpness = lights_[l].is_directional()
+                                     ? kDirectionalSharpness
+                                     : static_cast<double>(lights_[l].sharpness);
         lights_of_cloth_[cloth].push_back({sharpness, weight, facing[cloth][l] / seen.share});
         all += weight;
       }
-      for (LightShare& light : lights_of_cloth_[cloth]) light.weight = all > 0 ? light.weight / all : 0;
+      for (LightShare& light : lights_of_cloth_[cloth])
+        light.weight = all > 0 ? light.weight / all : 0;
       seen.share /= pilot_pixels_;
       seen.light_share = all_light > 0 ? seen.light_share / all_light : 0;
     }
   }
 
-  /// A cloth's light, squared, relative to the picture's: (light_share / share)^2, on `share` of the pixels.
+  /// A cloth's light, squared, relative to the picture's: (light_share / share)^2, on `share` of
+  /// the pixels.
   double weight_of(std::size_t cloth) const {
     const SeenCloth& seen = plan_.seen[cloth];
     return seen.light_share * seen.light_share / seen.share;
@@ -338,7 +364,8 @@ class ScenePlanner {
     return !plan_.scene.cloths[cloth].surface && plan_.seen[cloth].share > 0;
   }
 
-  // --- Tables ----------------------------------------------------------------------------------------------------------------
+  // --- Tables
+  // -----------------------------------------------------------------------------------------------
 
   void find_fabrics() {
     for (const ClothConfig& cloth : plan_.scene.cloths) {
@@ -376,12 +403,14 @@ class ScenePlanner {
   bool have_tables() {
     const std::optional<Offer> traced =
         offer(plan_.ways[0].candidate, plan_.question.tolerance, plan_.question.pictures);
-    const double samples = traced ? static_cast<double>(traced->spp) * pixels_ * plan_.question.pictures : INFINITY;
+    const double samples =
+        traced ? static_cast<double>(traced->spp) * pixels_ * plan_.question.pictures : INFINITY;
     for (const auto& fabric : fabrics_) {
       FabricStages& stages = stages_of(*fabric, {});
       if (!fs::exists(stages.accuracy_place().path) && samples < kTableSamples) {
         plan_.note = fmt::format(
-            "nothing is known of what else {} allows: path tracing takes less time than measuring it (heddle accuracy)",
+            "nothing is known of what else {} allows: path tracing takes less time than measuring "
+            "it (heddle accuracy)",
             fabric->name);
         return false;
       }
@@ -390,7 +419,8 @@ class ScenePlanner {
     for (const ClothConfig& cloth : plan_.scene.cloths) {
       if (!cloth.far_surface) continue;
       FabricStages& stages = stages_of(*fabric_of(cloth.fabric), {});
-      surfaces_.try_emplace(surface_key(cloth), read_accuracy(stages.accuracy(&*cloth.far_surface).path));
+      surfaces_.try_emplace(surface_key(cloth),
+                            read_accuracy(stages.accuracy(&*cloth.far_surface).path));
     }
     return true;
   }
@@ -399,7 +429,8 @@ class ScenePlanner {
     return {cloth.fabric, cloth.far_surface->text};
   }
 
-  // --- Ways ------------------------------------------------------------------------------------------------------------------
+  // --- Ways
+  // -----------------------------------------------------------------------------------------------
 
   void add_path() {
     Way way;
@@ -421,8 +452,9 @@ class ScenePlanner {
     for (std::size_t k = 0; k < plan_.scene.cloths.size(); ++k) {
       if (plan_.scene.cloths[k].far_surface && is_seen_fibers(k)) cloths.push_back(k);
     }
-    std::sort(cloths.begin(), cloths.end(),
-              [&](std::size_t a, std::size_t b) { return plan_.seen[a].footprint_mm > plan_.seen[b].footprint_mm; });
+    std::sort(cloths.begin(), cloths.end(), [&](std::size_t a, std::size_t b) {
+      return plan_.seen[a].footprint_mm > plan_.seen[b].footprint_mm;
+    });
     std::vector<std::set<std::size_t>> sets(1);
     for (const std::size_t cloth : cloths) {
       sets.push_back(sets.back());
@@ -458,14 +490,15 @@ class ScenePlanner {
       for (const auto& [form, blend] : forms()) {
         variant.blend = blend;
         for (const RenderMethod method : {RenderMethod::kExact, RenderMethod::kVolume}) {
-          for (const SceneVariant& of_fabrics : fabric_choices(method, variant)) add_way(method, of_fabrics);
+          for (const SceneVariant& of_fabrics : fabric_choices(method, variant))
+            add_way(method, of_fabrics);
         }
       }
     }
   }
 
-  /// Every choice of cells, order and voxels for every fabric. The order, which matters least, only where there is one fabric; and
-  /// many fabrics all alike.
+  /// Every choice of cells, order and voxels for every fabric. The order, which matters least, only
+  /// where there is one fabric; and many fabrics all alike.
   std::vector<SceneVariant> fabric_choices(RenderMethod method, const SceneVariant& base) const {
     std::vector<SceneVariant> choices = {base};
     const bool alike = fabrics_.size() > kMostApart;
@@ -503,13 +536,15 @@ class ScenePlanner {
   /// Names of table settings whose differences from `base` add up.
   struct Settings {
     std::string base;
-    std::vector<std::pair<std::string, std::string>> changes;  // (setting, of which setting it is a change)
+    // (setting, of which setting it is a change)
+    std::vector<std::pair<std::string, std::string>> changes;
   };
   Settings settings_of(RenderMethod method, const SceneVariant& variant,
                        const SceneVariant::OfFabric& of_fabric) const {
     Settings settings{render_method_name(method), {}};
     if (!is_precomputed(method)) return settings;
-    if (variant.blend == kSignedDistanceOnly) settings.changes.emplace_back(kDistanceSetting, "exact");
+    if (variant.blend == kSignedDistanceOnly)
+      settings.changes.emplace_back(kDistanceSetting, "exact");
     if (variant.blend == kLobesOnly) settings.changes.emplace_back(kGaussiansSetting, "exact");
     if (of_fabric.order) settings.changes.emplace_back(order_setting(*of_fabric.order), "exact");
     if (of_fabric.variant.cell_size != 1)
@@ -519,8 +554,9 @@ class ScenePlanner {
     return settings;
   }
 
-  /// An error in two parts: that of the mean colour, of which several add up, and the rest, whose squares do. What folds do to the
-  /// mean is kept apart: it does not make good where else a setting is too bright.
+  /// An error in two parts: that of the mean colour, of which several add up, and the rest, whose
+  /// squares do. What folds do to the mean is kept apart: it does not make good where else a
+  /// setting is too bright.
   struct Parts {
     Rgbd flat_ratio;
     Rgbd folds_ratio;
@@ -529,18 +565,21 @@ class ScenePlanner {
       folds_ratio *= to.flat_ratio / from.flat_ratio.max(1e-3);
       rest_square += to.rest_square - from.rest_square;
     }
-    /// What a setting changes is known without the noise of path tracing, but not whether it makes good or worse what errs already: worse by
-    /// half of it at least, or of many settings that which merely looks better is chosen.
+    /// What a setting changes is known without the noise of path tracing, but not whether it makes
+    /// good or worse what errs already: worse by half of it at least, or of many settings that
+    /// which merely looks better is chosen.
     void change(const Parts& to, const Parts& from, double change_square, bool in_folds) {
       (in_folds ? folds_ratio : flat_ratio) *= to.flat_ratio / from.flat_ratio.max(1e-3);
       rest_square += std::max(to.rest_square - from.rest_square, 0.5 * change_square);
     }
   };
   static Parts parts_of(const AccuracyTable& table, const Accuracy& entry) {
-    return {entry.color_ratio, Rgbd::Ones(), entry.bias_square - table.mean_square(entry.color_ratio)};
+    return {entry.color_ratio, Rgbd::Ones(),
+            entry.bias_square - table.mean_square(entry.color_ratio)};
   }
 
-  /// What a table says of one cloth: squares relative to the cloth's own light, noise and time relative to path tracing.
+  /// What a table says of one cloth: squares relative to the cloth's own light, noise and time
+  /// relative to path tracing.
   struct OfCloth {
     Estimate bias_square;
     double mean_error = 0;
@@ -560,7 +599,9 @@ class ScenePlanner {
       const auto at = [&](const std::string& setting) {
         return table.at(setting, light.sharpness, footprint, light.cosine);
       };
-      const auto folded = [&](const std::string& setting) { return table.at_bent(setting, light.sharpness); };
+      const auto folded = [&](const std::string& setting) {
+        return table.at_bent(setting, light.sharpness);
+      };
       const double weight = light.weight * light.weight;
       const Accuracy base = at(settings.base);
       const bool is_bent = plan_.scene.cloths[cloth].mesh.has_value();
@@ -570,19 +611,20 @@ class ScenePlanner {
         const Accuracy flat[] = {at(setting), at(of)};
         const Accuracy bent[] = {folded(setting), folded(of)};
         // Where light grazes, a setting may matter more.
-        const bool more_in_folds =
-            is_bent && bent[0].bias_square - bent[1].bias_square > flat[0].bias_square - flat[1].bias_square;
+        const bool more_in_folds = is_bent && bent[0].bias_square - bent[1].bias_square >
+                                                  flat[0].bias_square - flat[1].bias_square;
         const Accuracy* of_cloth = more_in_folds ? bent : flat;
         unsure = std::max(unsure, of_cloth->bias_square_error);
-        parts.change(parts_of(table, of_cloth[0]), parts_of(table, of_cloth[1]), of_cloth->change_square,
-                     more_in_folds);
+        parts.change(parts_of(table, of_cloth[0]), parts_of(table, of_cloth[1]),
+                     of_cloth->change_square, more_in_folds);
       }
       // What folds add to a flat swatch seen from as far.
       if (is_bent) {
-        const Accuracy flat =
-            table.at(settings.base, light.sharpness, table.bent_footprint_mm, table.bent_light_cosine);
+        const Accuracy flat = table.at(settings.base, light.sharpness, table.bent_footprint_mm,
+                                       table.bent_light_cosine);
         const Accuracy bent = folded(settings.base);
-        if (bent.bias_square > flat.bias_square) parts.add(parts_of(table, bent), parts_of(table, flat));
+        if (bent.bias_square > flat.bias_square)
+          parts.add(parts_of(table, bent), parts_of(table, flat));
         // Other folds show other pairs of view and light, but many of them.
         unsure = bent.bias_square_error;
       }
@@ -649,7 +691,8 @@ class ScenePlanner {
       const SeenCloth& of = plan_.seen[k];
       OfCloth answer;
       if (variant.stand_ins.contains(k)) {
-        answer = ask(surfaces_.at(surface_key(cloth)), {surface_setting(cloth.far_surface->name), {}}, k);
+        answer = ask(surfaces_.at(surface_key(cloth)),
+                     {surface_setting(cloth.far_surface->name), {}}, k);
       } else {
         const Fabric& fabric = *fabric_of(cloth.fabric);
         answer = ask(*fabric.table, settings_of(method, variant, variant.of(cloth.fabric)), k);
@@ -665,12 +708,14 @@ class ScenePlanner {
       time += of.share * answer.time_ratio;
       seen += of.share;
       if (set_up.insert(cloth.fabric).second) {
-        candidate.setup_seconds += answer.setup_seconds * static_cast<double>(std::max<std::size_t>(1, lights_.size()));
+        candidate.setup_seconds +=
+            answer.setup_seconds * static_cast<double>(std::max<std::size_t>(1, lights_.size()));
       }
     }
     const double noise_ratio = noise_weight > 0 ? noise / noise_weight : 1;
     const Estimate traced = relative(path_variance_);
-    candidate.noise_square = {noise_ratio * traced.value, noise_ratio * std::hypot(traced.error, 0.2 * traced.value)};
+    candidate.noise_square = {noise_ratio * traced.value,
+                              noise_ratio * std::hypot(traced.error, 0.2 * traced.value)};
     candidate.seconds_per_spp = path_seconds_per_spp_ * (seen > 0 ? time / seen : 1);
     candidate.build_seconds = build_seconds(way);
     way.candidate.bias_square = thought_of(way);
@@ -712,8 +757,10 @@ class ScenePlanner {
       return seconds_of(stage + ", " + voxels_setting(of.variant.voxel_rate));
     double seconds = seconds_of(stage);
     if (stage != "transfer" || !(seconds > 0)) return seconds;
-    if (of.variant.cell_size != 1) seconds = seconds_of(stage + ", " + cells_setting(of.variant.cell_size));
-    if (of.order) seconds *= seconds_of(stage + ", " + order_setting(*of.order)) / seconds_of(stage);
+    if (of.variant.cell_size != 1)
+      seconds = seconds_of(stage + ", " + cells_setting(of.variant.cell_size));
+    if (of.order)
+      seconds *= seconds_of(stage + ", " + order_setting(*of.order)) / seconds_of(stage);
     return seconds;
   }
 
@@ -724,7 +771,8 @@ class ScenePlanner {
     for (const auto& fabric : fabrics_) {
       if (!draws_fibers(way, fabric->file)) continue;
       const SceneVariant::OfFabric of = way.variant.of(fabric->file);
-      changes += static_cast<int>(of.order.has_value()) + static_cast<int>(of.variant.cell_size != 1) +
+      changes += static_cast<int>(of.order.has_value()) +
+                 static_cast<int>(of.variant.cell_size != 1) +
                  static_cast<int>(of.variant.voxel_rate != 1);
     }
     return changes;
@@ -739,9 +787,11 @@ class ScenePlanner {
         if (!draws_fibers(way, fabric->file)) continue;
         const SceneVariant::OfFabric of = way.variant.of(fabric->file);
         const std::string of_which = fabrics_.size() > 1 ? fabric->file.stem().string() + " " : "";
-        if (of.variant.cell_size != 1) name += ", " + of_which + cells_setting(of.variant.cell_size);
+        if (of.variant.cell_size != 1)
+          name += ", " + of_which + cells_setting(of.variant.cell_size);
         if (of.order) name += ", " + of_which + order_setting(*of.order);
-        if (of.variant.voxel_rate != 1) name += ", " + of_which + voxels_setting(of.variant.voxel_rate);
+        if (of.variant.voxel_rate != 1)
+          name += ", " + of_which + voxels_setting(of.variant.voxel_rate);
       }
     }
     for (const std::size_t k : way.variant.stand_ins) {
@@ -750,7 +800,8 @@ class ScenePlanner {
     return name;
   }
 
-  // --- The choice ------------------------------------------------------------------------------------------------------------
+  // --- The choice
+  // -----------------------------------------------------------------------------------------------
 
   std::vector<Candidate> candidates() const {
     std::vector<Candidate> list;
@@ -784,33 +835,38 @@ class ScenePlanner {
   /// A pilot of so many samples in all, first of more pixels.
   void trace_pilot_of(double samples) {
     const double pixels = std::min(pixels_, samples / kPilotSamples);
-    trace_pilot(static_cast<int>(pixels), 2 * std::max(kPilotSamples / 2, static_cast<int>(samples / pixels / 2)));
+    trace_pilot(static_cast<int>(pixels),
+                2 * std::max(kPilotSamples / 2, static_cast<int>(samples / pixels / 2)));
     Candidate& path = plan_.ways[0].candidate;
     path.noise_square = relative(path_variance_);
     path.seconds_per_spp = path_seconds_per_spp_;
   }
 
-  /// Finds out more of a way that may be much cheaper than what is offered, if it errs by less than caution allows for; false where
-  /// there is none, or finding out takes too long.
+  /// Finds out more of a way that may be much cheaper than what is offered, if it errs by less than
+  /// caution allows for; false where there is none, or finding out takes too long.
   bool hope(const Offer& offered) {
     std::vector<Candidate> list = candidates();
     for (Candidate& candidate : list) candidate.bias_square = at_best(candidate.bias_square);
-    const std::optional<std::size_t> best =
-        cheapest_known(list, std::vector<bool>(list.size()), plan_.question.tolerance, plan_.question.pictures);
+    const std::optional<std::size_t> best = cheapest_known(
+        list, std::vector<bool>(list.size()), plan_.question.tolerance, plan_.question.pictures);
     if (!best || *best == *plan_.chosen) return false;
     const Offer hoped = *offer(list[*best], plan_.question.tolerance, plan_.question.pictures);
     if (hoped.seconds > kHope * offered.seconds) return false;
     // What the chosen way's own pilot says holds of its kind.
-    Way& way = plan_.ways[plan_.ways[*best].kind() == plan_.ways[*plan_.chosen].kind() ? *plan_.chosen : *best];
+    Way& way =
+        plan_.ways[plan_.ways[*best].kind() == plan_.ways[*plan_.chosen].kind() ? *plan_.chosen
+                                                                                : *best];
     const double affordable = kBuildShare * (offered.seconds - hoped.seconds);
-    if (!may_try(way) || way.candidate.build_seconds + seconds_to_try(way) > affordable) return false;
+    if (!may_try(way) || way.candidate.build_seconds + seconds_to_try(way) > affordable)
+      return false;
     return find_out(way, kPilotShare * offered.seconds, true);
   }
 
   /// Finds out more of the way that looks cheapest; false where there is nothing to find out.
   bool learn(Way& way, const Offer& offered) {
     if (way.family == "path") {
-      // A picture finds out itself how many samples it needs: only the choice depends on its noise here.
+      // A picture finds out itself how many samples it needs: only the choice depends on its noise
+      // here.
       const double error = way.candidate.noise_square.error / way.candidate.noise_square.value;
       return error >= kNoiseKnown && has_rival(offered) &&
              more_paths(4 * pilot_samples(), kPilotShare * offered.seconds);
@@ -826,12 +882,14 @@ class ScenePlanner {
            find_out(way, affordable, false);
   }
 
-  /// Tries a way against the paths that there are, if that tells more of its error than is known and has not been done to one of its kind;
-  /// else a larger pilot of paths, if one that tells enough is affordable. False where neither is.
+  /// Tries a way against the paths that there are, if that tells more of its error than is known
+  /// and has not been done to one of its kind; else a larger pilot of paths, if one that tells
+  /// enough is affordable. False where neither is.
   bool find_out(Way& way, double affordable, bool hoped_for) {
     const double known = way.candidate.bias_square.error;
     const auto of_kind = piloted_.find(way.kind());
-    const bool is_new = of_kind == piloted_.end() || plan_.ways[of_kind->second].pilot->samples < pilot_samples();
+    const bool is_new =
+        of_kind == piloted_.end() || plan_.ways[of_kind->second].pilot->samples < pilot_samples();
     if (is_new && pilot_error(pilot_samples()) <= kTelling * known) {
       try_out(way, hoped_for);
       return true;
@@ -849,10 +907,12 @@ class ScenePlanner {
     return true;
   }
 
-  /// Standard error of the squared error that pilots of so many paths, and of a way in about the same time, say.
+  /// Standard error of the squared error that pilots of so many paths, and of a way in about the
+  /// same time, say.
   double pilot_error(double samples) const {
     const double pixels = std::min(pixels_, samples / kPilotSamples);
-    return 2.5 * plan_.ways[0].candidate.noise_square.value / (samples / pixels * std::sqrt(pixels));
+    return 2.5 * plan_.ways[0].candidate.noise_square.value /
+           (samples / pixels * std::sqrt(pixels));
   }
 
   /// Does another way not cost much more?
@@ -868,7 +928,8 @@ class ScenePlanner {
   double pilot_samples() const { return pilot_pixels_ * path_spp_; }
   double seconds_per_path() const { return path_seconds_per_spp_ / pixels_; }
 
-  /// A larger pilot of paths, in the seconds affordable; false where it would not be much larger. Four times the samples are twice as sure.
+  /// A larger pilot of paths, in the seconds affordable; false where it would not be much larger.
+  /// Four times the samples are twice as sure.
   bool more_paths(double wanted, double affordable) {
     wanted = std::min(wanted, affordable / seconds_per_path());
     if (wanted < 2 * pilot_samples()) return false;
@@ -876,18 +937,23 @@ class ScenePlanner {
     return true;
   }
 
-  bool may_try(const Way& way) const { return plan_.question.may_build || !(way.candidate.build_seconds > 0); }
-  /// Samples per pixel of a pilot to be compared with that of paths: as many as tell most of the difference in the time of both.
+  bool may_try(const Way& way) const {
+    return plan_.question.may_build || !(way.candidate.build_seconds > 0);
+  }
+  /// Samples per pixel of a pilot to be compared with that of paths: as many as tell most of the
+  /// difference in the time of both.
   int samples_to_try(const Way& way) const {
     const Candidate& path = plan_.ways[0].candidate;
     const double noise = way.candidate.noise_square.value / path.noise_square.value;
     const double time = way.candidate.seconds_per_spp / path.seconds_per_spp;
     const double samples = path_spp_ * std::sqrt(noise / time);
-    return 2 * std::clamp(static_cast<int>(std::lround(samples / 2)), kPilotSamples / 2, path_spp_ / 2);
+    return 2 *
+           std::clamp(static_cast<int>(std::lround(samples / 2)), kPilotSamples / 2, path_spp_ / 2);
   }
   /// Building apart.
   double seconds_to_try(const Way& way) const {
-    return way.candidate.setup_seconds + samples_to_try(way) * pilot_pixels_ / pixels_ * way.candidate.seconds_per_spp;
+    return way.candidate.setup_seconds +
+           samples_to_try(way) * pilot_pixels_ / pixels_ * way.candidate.seconds_per_spp;
   }
 
   /// Is light between cloths what is known least of the way's error?
@@ -928,9 +994,10 @@ class ScenePlanner {
     now.setup_seconds = crops.setup.seconds;
     now.build_seconds = 0;  // by now it is there
     Estimate measured = relative(squared_bias(crops.frames, paths_));
-    // The spread between few blocks misses rare bright paths; the noise of two halves is at least this.
-    const double noise =
-        2 * (plan_.ways[0].candidate.noise_square.value / path_spp_ + now.noise_square.value / samples);
+    // The spread between few blocks misses rare bright paths; the noise of two halves is at least
+    // this.
+    const double noise = 2 * (plan_.ways[0].candidate.noise_square.value / path_spp_ +
+                              now.noise_square.value / samples);
     measured.error = std::max(measured.error, noise / std::sqrt(pilot_pixels_));
     bool may_lower = hoped_for;
     const auto index = static_cast<std::size_t>(&way - plan_.ways.data());
@@ -940,7 +1007,8 @@ class ScenePlanner {
       plan_.ways[of_kind->second].pilot.reset();
       of_kind->second = index;
     }
-    way.pilot = {measured, pilot_samples(), std::max(kLeastUnseen, 1 - pilot_pixels_ / pixels_), may_lower};
+    way.pilot = {measured, pilot_samples(), std::max(kLeastUnseen, 1 - pilot_pixels_ / pixels_),
+                 may_lower};
     // What differs from the table here does so for the like of it too.
     const double noise_ratio = now.noise_square.value / before.noise_square.value;
     const double time_ratio = now.seconds_per_spp / before.seconds_per_spp;
@@ -949,8 +1017,9 @@ class ScenePlanner {
       other.tried = true;
       if (&other == &way) continue;
       Candidate& like = other.candidate;
-      like.noise_square = {like.noise_square.value * noise_ratio,
-                           like.noise_square.value * now.noise_square.error / now.noise_square.value};
+      like.noise_square = {
+          like.noise_square.value * noise_ratio,
+          like.noise_square.value * now.noise_square.error / now.noise_square.value};
       like.seconds_per_spp *= time_ratio;
       like.setup_seconds = now.setup_seconds;
       like.build_seconds = build_seconds(other);
@@ -958,11 +1027,12 @@ class ScenePlanner {
     add_up();
   }
 
-  /// The picture's mean, which few paths tell badly, by what a way that has hardly any noise makes of it. All that is relative to it
-  /// follows.
+  /// The picture's mean, which few paths tell badly, by what a way that has hardly any noise makes
+  /// of it. All that is relative to it follows.
   void refine_mean(const Way& way, double mean) {
     if (!(mean > 0) || !(mean_.value > 0)) return;
-    const double missing = way.mean_error + (lacks_light_between(way) ? std::min(0.0, light_between_mean_) : 0);
+    const double missing =
+        way.mean_error + (lacks_light_between(way) ? std::min(0.0, light_between_mean_) : 0);
     const double before = mean_.value;
     mean_ = combined(path_mean_, {mean, mean * std::hypot(kMeanError, missing)});
     const double scale = before * before / (mean_.value * mean_.value);
@@ -972,9 +1042,9 @@ class ScenePlanner {
     }
   }
 
-  /// Where this view and these lights make much of the higher harmonics, other errors of flat cloth are large, too: light that hardly
-  /// any of the cloth sends here is hard to get right. Two pictures by the fabrics' own data that share all else tell it, next to free of
-  /// noise.
+  /// Where this view and these lights make much of the higher harmonics, other errors of flat cloth
+  /// are large, too: light that hardly any of the cloth sends here is hard to get right. Two
+  /// pictures by the fabrics' own data that share all else tell it, next to free of noise.
   void measure_stress() {
     constexpr int kLowOrder = kOtherOrders[0];
     const auto own = std::find_if(plan_.ways.begin(), plan_.ways.end(), [](const Way& way) {
@@ -988,10 +1058,10 @@ class ScenePlanner {
       if (plan_.scene.cloths[k].mesh || fabric.order <= kLowOrder) return;
       OverLights changes;
       for (const LightShare& light : lights_of_cloth_[k]) {
-        changes.add(
-            light.weight,
-            fabric.table->at(order_setting(kLowOrder), light.sharpness, plan_.seen[k].footprint_mm, light.cosine)
-                .change_square);
+        changes.add(light.weight, fabric.table
+                                      ->at(order_setting(kLowOrder), light.sharpness,
+                                           plan_.seen[k].footprint_mm, light.cosine)
+                                      .change_square);
       }
       thought += weight_of(k) * changes.square();
     }
@@ -999,8 +1069,10 @@ class ScenePlanner {
     const SceneJob::Crops whole = shoot(*job_, request);
     const SceneJob::Crops low = shoot(*job_, request, kLowOrder);
     const double mean = mean_radiance(whole.frames);
-    const double change = mean > 0 ? squared_bias(low.frames, whole.frames).value / (mean * mean) : 0;
-    stress_ = thought > 0 && change > 0 ? std::clamp(std::sqrt(change / thought), 1.0, kMostStress) : 1;
+    const double change =
+        mean > 0 ? squared_bias(low.frames, whole.frames).value / (mean * mean) : 0;
+    stress_ =
+        thought > 0 && change > 0 ? std::clamp(std::sqrt(change / thought), 1.0, kMostStress) : 1;
     for (Way& way : plan_.ways) {
       if (!is_precomputed(way.method) || !way.variant.stand_ins.empty()) continue;
       way.bias_square.value *= *stress_;
@@ -1018,18 +1090,22 @@ class ScenePlanner {
   std::vector<Light> lights_;                             // environments as Gaussians
   std::vector<std::vector<LightShare>> lights_of_cloth_;  // [cloth][light]
   std::vector<std::vector<PixelLight>> pixel_lights_;     // [cloth][pixel of the first pilot on it]
-  std::vector<double> enclosure_square_;                  // [cloth] mean over the pixels of the first pilot on it
+  // [cloth] mean over the pixels of the first pilot on it
+  std::vector<double> enclosure_square_;
   std::vector<std::unique_ptr<Fabric>> fabrics_;
   std::map<std::pair<fs::path, std::string>, AccuracyTable> surfaces_;
 
   std::vector<PixelRect> blocks_;
-  std::vector<FrameBuffers> paths_;             // [block]
-  std::vector<FrameBuffers> local_paths_;       // [block] the same, local; empty until asked for, or where all are
+  std::vector<FrameBuffers> paths_;  // [block]
+  // [block] the same, local; empty until asked for, or where all are
+  std::vector<FrameBuffers> local_paths_;
   Estimate light_between_;                      // squared, of what is not local
   double light_between_mean_ = 0;               // of the picture's mean without it
   std::map<std::string, std::size_t> piloted_;  // [kind of ways] the way that has its pilot
   std::optional<double>
-      stress_;  // squared errors of flat cloth, relative to the table's; known once a precomputed way is tried
+      // squared errors of flat cloth, relative to the table's; known once a precomputed way is
+      // tried
+      stress_;
   double pilot_pixels_ = 0;
   int path_spp_ = 0;
   double path_setup_ = 0;

@@ -1,22 +1,28 @@
 #ifndef HEDDLE_PIPELINE_PLAN_SCENE_PLAN_H_
 #define HEDDLE_PIPELINE_PLAN_SCENE_PLAN_H_
-// From a scene and a tolerance to the cheapest way of making its picture that is good enough. What is known of the ways:
+// From a scene and a tolerance to the cheapest way of making its picture that is good enough. What
+// is known of the ways:
 //
-//   a pilot of the view itself     a few path-traced samples of blocks of pixels: noise and speed of path tracing here, which cloth
-//                                  covers how much, from how far, how lights reach it
-//   the fabrics' accuracy tables   error, noise and speed of the other ways against path tracing, by light and footprint, and
-//                                  what their data take to build
+//   a pilot of the view itself     a few path-traced samples of blocks of pixels: noise and speed
+//                                  of path tracing here, which cloth covers how much, from how far,
+//                                  how lights reach it
+//   the fabrics' accuracy tables   error, noise and speed of the other ways against path tracing,
+//                                  by light and footprint, and what their data take to build
 //   the cache                      which data are there already
-//   more pilots                    of the way that looks cheapest, where its data are there or may be built
-//   light between cloths           (and between slopes of one), which is missing from dual scattering and the precomputed methods: what
-//                                  they see of each other (enclosure.h), and paths of the pilot with and without what they meet
-//                                  beyond the cloth that they leave
+//   more pilots                    of the way that looks cheapest, where its data are there or may
+//                                  be built
+//   light between cloths           (and between slopes of one), which is missing from dual
+//                                  scattering and the precomputed methods: what they see of each
+//                                  other (enclosure.h), and paths of the pilot with and without
+//                                  what they meet beyond the cloth that they leave
 //   two orders of the transfer     of a flat scene: how much this view and these lights ask of it
 //
-// Ways: path tracing, 6 scattering events of it, dual scattering; and the precomputed methods with, for each fabric, the size of
-// its cells and the order of its transfer, voxels, and the form of visibility of the Gaussian lights; each also with the farthest
-// cloths drawn by their `far_surface`. Fabrics share method and form of visibility, pieces of one fabric its data.
-// Errors: ConfigError, FileError, Interrupted. Tested in tests/pipeline/plan_test.cpp and end_to_end_test.cpp.
+// Ways: path tracing, 6 scattering events of it, dual scattering; and the precomputed methods with,
+// for each fabric, the size of its cells and the order of its transfer, voxels, and the form of
+// visibility of the Gaussian lights; each also with the farthest cloths drawn by their
+// `far_surface`. Fabrics share method and form of visibility, pieces of one fabric its data.
+// Errors: ConfigError, FileError, Interrupted. Tested in tests/pipeline/plan_test.cpp and
+// end_to_end_test.cpp.
 
 #include <filesystem>
 #include <map>
@@ -44,19 +50,23 @@ struct PlanQuestion {
 /// A way to make the picture.
 struct Way {
   std::string
-      family;  // "path", "path-6", "dual-scattering", "exact", "volume"; with "+ surfaces" where some cloth is one
+      // "path", "path-6", "dual-scattering", "exact", "volume"; with "+ surfaces" where some cloth
+      // is one
+      family;
   RenderMethod method = RenderMethod::kPath;
   SceneVariant variant;
-  Estimate bias_square;   // against what the method claims to compute: the candidate's without the light between cloths
-  double mean_error = 0;  // of the picture's mean radiance, relative, as the tables have it; part of bias_square
+  // against what the method claims to compute: the candidate's without the light between cloths
+  Estimate bias_square;
+  // of the picture's mean radiance, relative, as the tables have it; part of bias_square
+  double mean_error = 0;
   Candidate candidate;
   /// What the pilot said of its error, against paths that miss nothing.
   struct Pilot {
     Estimate bias_square;
     double samples;  // of paths
     double unseen;   // share of the picture's pixels
-    // Rare large squares make the mean, and a pilot that has met none of them says too little: it is believed only of a way that would not do
-    // otherwise.
+    // Rare large squares make the mean, and a pilot that has met none of them says too little: it
+    // is believed only of a way that would not do otherwise.
     bool may_lower;
   };
   std::optional<Pilot> pilot = {};  // of one of its kind at most
@@ -69,7 +79,8 @@ inline bool is_precomputed(RenderMethod method) {
   return method == RenderMethod::kExact || method == RenderMethod::kVolume;
 }
 
-/// Ways that share their errors, noise and speed up to what tables tell apart: what a pilot finds of one holds of all.
+/// Ways that share their errors, noise and speed up to what tables tell apart: what a pilot finds
+/// of one holds of all.
 inline std::string Way::kind() const {
   if (!is_precomputed(method)) return family;
   return variant.stand_ins.empty() ? "precomputed" : "precomputed + surfaces";
@@ -85,14 +96,16 @@ struct SeenCloth {
 struct ScenePlan {
   PlanQuestion question;
   SceneConfig scene;
-  PictureRequest request;  // of the view: camera, crop, seed; method and samples are the chosen way's, if there is one
+  // of the view: camera, crop, seed; method and samples are the chosen way's, if there is one
+  PictureRequest request;
   std::vector<SeenCloth> seen;  // [cloth of the scene]
   std::vector<Way> ways;
   std::optional<std::size_t> chosen;  // of ways
   std::optional<Offer> offer;         // of the chosen one
   double best_tolerance = 0;          // that any way meets
-  WorkTime time;                      // that the plan took, without building data and loading the scene
-  std::string note;                   // why no table was asked, or empty
+  // that the plan took, without building data and loading the scene
+  WorkTime time;
+  std::string note;  // why no table was asked, or empty
 };
 
 ScenePlan make_plan(const PlanQuestion& question, StageContext& context);

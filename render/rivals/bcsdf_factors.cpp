@@ -39,7 +39,8 @@ BcsdfFactors::BcsdfFactors(const FiberScattering& fiber, int terms, Matrix matri
   std::vector<double> scales = {1 / (2 * kPi)};
   if (!fiber.isotropic_white) {
     const std::vector<double> ratios = mode_ratios(1 / (fiber.gamma_tt * fiber.gamma_tt), kMaxMode);
-    for (std::size_t m = 1; m < ratios.size(); ++m) scales.push_back((m % 2 != 0 ? -1 : 1) * ratios[m] / kPi);
+    for (std::size_t m = 1; m < ratios.size(); ++m)
+      scales.push_back((m % 2 != 0 ? -1 : 1) * ratios[m] / kPi);
   }
 
   // TT's longitudinal part: its value straight on over the azimuth's there.
@@ -82,8 +83,8 @@ BcsdfFactors::BcsdfFactors(const FiberScattering& fiber, int terms, Matrix matri
   }
 }
 
-void BcsdfFactors::cut(const Block& both, const Block& tt, const std::vector<double>& mode_scales, int terms, Matrix matrix,
-                       int c) {
+void BcsdfFactors::cut(const Block& both, const Block& tt, const std::vector<double>& mode_scales,
+                       int terms, Matrix matrix, int c) {
   // What the blocks, which hold S cos(theta_i), are multiplied by on either side.
   Eigen::ArrayXf left(thetas_);
   Eigen::ArrayXf right(thetas_);
@@ -93,13 +94,15 @@ void BcsdfFactors::cut(const Block& both, const Block& tt, const std::vector<dou
     right[i] = static_cast<float>(matrix == Matrix::kWeighted ? std::sqrt(cosine) : 1);
   }
   const auto decompose = [&](const Block& block) {
-    return Eigen::BDCSVD<Eigen::MatrixXf>(left.matrix().asDiagonal() * block * right.matrix().asDiagonal(),
-                                          Eigen::ComputeThinU | Eigen::ComputeThinV);
+    return Eigen::BDCSVD<Eigen::MatrixXf>(
+        left.matrix().asDiagonal() * block * right.matrix().asDiagonal(),
+        Eigen::ComputeThinU | Eigen::ComputeThinV);
   };
   const auto svd_both = decompose(both);
   const auto svd_tt = decompose(tt);
 
-  // Singular values of the whole matrix: cos(m (phi_o - phi_i)) has the norm 2 pi for m = 0, pi twice for the others.
+  // Singular values of the whole matrix: cos(m (phi_o - phi_i)) has the norm 2 pi for m = 0, pi
+  // twice for the others.
   struct Term {
     double value;
     int m;
@@ -110,12 +113,14 @@ void BcsdfFactors::cut(const Block& both, const Block& tt, const std::vector<dou
     candidates.push_back({2 * kPi * svd_both.singularValues()[i], 0});
     total += candidates.back().value * candidates.back().value;
     for (std::size_t m = 1; m < mode_scales.size(); ++m) {
-      candidates.push_back({kPi * std::abs(mode_scales[m]) * svd_tt.singularValues()[i], static_cast<int>(m)});
+      candidates.push_back(
+          {kPi * std::abs(mode_scales[m]) * svd_tt.singularValues()[i], static_cast<int>(m)});
       total += 2 * candidates.back().value * candidates.back().value;
     }
   }
-  std::stable_sort(candidates.begin(), candidates.end(),
-                   [](const Term& a, const Term& b) { return std::tie(b.value, a.m) < std::tie(a.value, b.m); });
+  std::stable_sort(candidates.begin(), candidates.end(), [](const Term& a, const Term& b) {
+    return std::tie(b.value, a.m) < std::tie(a.value, b.m);
+  });
   std::vector<int> kept(mode_scales.size(), 0);
   int spent = 0;
   double held = 0;
@@ -177,15 +182,16 @@ Rgb BcsdfFactors::response(const Vec3& axis, float sharpness, const Vec3& wo) co
   const float theta_axis = std::asin(std::clamp(axis.x(), -1.0F, 1.0F));
   const float reach = kReach / std::sqrt(sharpness + 1e-6F);
   const auto index = [&](float theta) {
-    return std::clamp(static_cast<int>(std::floor((theta / kPif + 0.5F) * static_cast<float>(thetas_))), 0,
-                      thetas_ - 1);
+    return std::clamp(
+        static_cast<int>(std::floor((theta / kPif + 0.5F) * static_cast<float>(thetas_))), 0,
+        thetas_ - 1);
   };
   const int first = reach < kPif ? index(theta_axis - reach) : 0;
   const int last = reach < kPif ? index(theta_axis + reach) : thetas_ - 1;
 
   const float theta_o = std::asin(std::clamp(wo.x(), -1.0F, 1.0F));
-  const float column = std::clamp((theta_o / kPif + 0.5F) * static_cast<float>(thetas_) - 0.5F, 0.0F,
-                                  static_cast<float>(thetas_ - 1));
+  const float column = std::clamp((theta_o / kPif + 0.5F) * static_cast<float>(thetas_) - 0.5F,
+                                  0.0F, static_cast<float>(thetas_ - 1));
   const int o = std::min(static_cast<int>(column), thetas_ - 2);
   const float v = column - static_cast<float>(o);
   const float delta = std::atan2(wo.z(), wo.y()) - std::atan2(axis.z(), axis.y());
@@ -198,12 +204,14 @@ Rgb BcsdfFactors::response(const Vec3& axis, float sharpness, const Vec3& wo) co
   const float cos_axis = std::cos(theta_axis);
   Rgb sum = Rgb::Zero();
   for (int i = first; i <= last; ++i) {
-    const float theta = kPif * ((static_cast<float>(i) + 0.5F) / static_cast<float>(thetas_) - 0.5F);
+    const float theta =
+        kPif * ((static_cast<float>(i) + 0.5F) / static_cast<float>(thetas_) - 0.5F);
     const float s = std::sin(0.5F * (theta - theta_axis));
     const float a = sharpness * cos_axis * std::cos(theta);
     // The density's measure is cos(theta) d theta d phi.
     const float weight = std::exp(-2 * sharpness * s * s) * std::cos(theta) * step * 2 * kPif;
-    // I_m / I_{m-1} by backward recurrence from Amos' bound (1974) for the ratio a few orders further up.
+    // I_m / I_{m-1} by backward recurrence from Amos' bound (1974) for the ratio a few orders
+    // further up.
     const int top = highest_mode_ + 4;
     const auto above = static_cast<float>(top);
     float quotient = a / (above + 0.5F + std::sqrt((above + 1.5F) * (above + 1.5F) + a * a));

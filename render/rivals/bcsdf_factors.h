@@ -1,19 +1,23 @@
 #ifndef HEDDLE_RENDER_RIVALS_BCSDF_FACTORS_H_
 #define HEDDLE_RENDER_RIVALS_BCSDF_FACTORS_H_
-// A fiber's BCSDF times cos(theta_i) as a matrix over directions (wi, wo), cut to the R largest terms of its singular value
-// decomposition, sum over r of g_r(wi) h_r(wo): the factored BRDF of Tsai and Shih 2006, one decomposition per colour.
+// A fiber's BCSDF times cos(theta_i) as a matrix over directions (wi, wo), cut to the R largest
+// terms of its singular value decomposition, sum over r of g_r(wi) h_r(wo): the factored BRDF of
+// Tsai and Shih 2006, one decomposition per colour.
 //
-// The matrix's symmetry does most of the work. S depends on azimuths through phi_o - phi_i only, so on a lattice equally
-// spaced in azimuth Fourier modes cos(m (phi_o - phi_i)) split the matrix into blocks over (theta_i, theta_o) (m = 0 once, m > 0
-// twice, as cos cos and sin sin): the singular values of the blocks are the matrix's. Mode 0 holds R and TT; every other
-// mode is the block of TT times a number, so there are two decompositions per colour, whatever the number of azimuths.
-// What is cut depends on what is decomposed. kWeighted: S cos(theta_i) times the square roots of the two solid angles, for which the
-// cut is the best in the mean over the spheres. kPlain: the values of S alone. S grows as 1 / Gn near grazing, a thousandfold for
-// beta = 1 degree, and the first terms of the plain matrix hold little else: all other directions go black.
-// Where one of a pair's two terms would be cut off, both are.
-// The lattice in theta resolves the narrowest lobe (deviations from 0.7 degrees, half a deviation per step); between lattice
-// points the matrix is interpolated linearly, which widens a lobe: the peak of the narrowest is 2 % low.
-// With all terms the matrix is not decomposed. A second or two per fiber at R = 16. Tested in tests/render/rivals/bcsdf_factors_test.cpp.
+// The matrix's symmetry does most of the work. S depends on azimuths through phi_o - phi_i only, so
+// on a lattice equally spaced in azimuth Fourier modes cos(m (phi_o - phi_i)) split the matrix into
+// blocks over (theta_i, theta_o) (m = 0 once, m > 0 twice, as cos cos and sin sin): the singular
+// values of the blocks are the matrix's. Mode 0 holds R and TT; every other mode is the block of TT
+// times a number, so there are two decompositions per colour, whatever the number of azimuths. What
+// is cut depends on what is decomposed. kWeighted: S cos(theta_i) times the square roots of the two
+// solid angles, for which the cut is the best in the mean over the spheres. kPlain: the values of S
+// alone. S grows as 1 / Gn near grazing, a thousandfold for beta = 1 degree, and the first terms of
+// the plain matrix hold little else: all other directions go black. Where one of a pair's two terms
+// would be cut off, both are. The lattice in theta resolves the narrowest lobe (deviations from 0.7
+// degrees, half a deviation per step); between lattice points the matrix is interpolated linearly,
+// which widens a lobe: the peak of the narrowest is 2 % low. With all terms the matrix is not
+// decomposed. A second or two per fiber at R = 16. Tested in
+// tests/render/rivals/bcsdf_factors_test.cpp.
 
 #include <Eigen/Core>
 #include <array>
@@ -36,11 +40,13 @@ class BcsdfFactors {
   /// S(wi, wo) cos(theta_i), fiber frame. Can be negative when terms are cut.
   Rgb value(const Vec3& wi, const Vec3& wo) const;
 
-  /// Integral over wi of G(wi; axis, sharpness) times that, G not normalised: exact in azimuth, by the lattice in theta.
+  /// Integral over wi of G(wi; axis, sharpness) times that, G not normalised: exact in azimuth, by
+  /// the lattice in theta.
   Rgb response(const Vec3& axis, float sharpness, const Vec3& wo) const;
 
   int thetas() const { return thetas_; }
-  /// Terms kept, and the share of the matrix's squared norm that they hold, per colour; 1 with all terms.
+  /// Terms kept, and the share of the matrix's squared norm that they hold, per colour; 1 with all
+  /// terms.
   const std::array<int, 3>& terms() const { return terms_; }
   const std::array<double, 3>& energy() const { return energy_; }
 
@@ -57,7 +63,8 @@ class BcsdfFactors {
     std::vector<Mode> modes;
     std::vector<Block> blocks;
   };
-  void cut(const Block& both, const Block& tt, const std::vector<double>& mode_scales, int terms, Matrix matrix, int c);
+  void cut(const Block& both, const Block& tt, const std::vector<double>& mode_scales, int terms,
+           Matrix matrix, int c);
 
   int thetas_;
   int highest_mode_ = 0;

@@ -12,8 +12,8 @@ OpenMaps::OpenMaps(const SsdfVisibility& ssdf, bool both_sides) : ssdf_(&ssdf) {
     const double band = std::cos(kPi * row / n) - std::cos(kPi * (row + 1) / n);
     for (int column = 0; column < n; ++column) {
       const double azimuth = 2 * kPi * (column + 0.5) / n;
-      directions_.emplace_back(std::sin(polar) * std::cos(azimuth), std::sin(polar) * std::sin(azimuth),
-                               std::cos(polar));
+      directions_.emplace_back(std::sin(polar) * std::cos(azimuth),
+                               std::sin(polar) * std::sin(azimuth), std::cos(polar));
       solid_angles_.push_back(band * 2 * kPi / n);
     }
   }
@@ -26,7 +26,8 @@ Eigen::MatrixXf OpenMaps::open(std::uint32_t first, std::uint32_t last) const {
   for (std::uint32_t s = first; s < last; ++s) {
     for (Eigen::Index k = 0; k < components; ++k) {
       coefficients(k, s - first) =
-          float_from_half(ssdf_->coefficients[s * static_cast<std::size_t>(components) + static_cast<std::size_t>(k)]);
+          float_from_half(ssdf_->coefficients[s * static_cast<std::size_t>(components) +
+                                              static_cast<std::size_t>(k)]);
     }
   }
   // The basis is stored [cell][component]: column by column, a matrix [component, cell].

@@ -1,9 +1,10 @@
 #ifndef HEDDLE_RENDER_RIVALS_OPEN_MAPS_H_
 #define HEDDLE_RENDER_RIVALS_OPEN_MAPS_H_
-// Which directions are open from each segment, as the signs of the stored signed distances say, on the cells of their
-// lat-long map: from what the rivals make their own representations of visibility, so that they differ from
-// ours by nothing else. Directions below the horizon count as closed where light comes from the face only.
-// 26 us per segment at 128 x 128 cells: two matrix products. Tested in tests/render/rivals/open_maps_test.cpp.
+// Which directions are open from each segment, as the signs of the stored signed distances say, on
+// the cells of their lat-long map: from what the rivals make their own representations of
+// visibility, so that they differ from ours by nothing else. Directions below the horizon count as
+// closed where light comes from the face only. 26 us per segment at 128 x 128 cells: two matrix
+// products. Tested in tests/render/rivals/open_maps_test.cpp.
 
 #include <Eigen/Core>
 #include <vector>
@@ -17,7 +18,9 @@ class OpenMaps {
   /// `ssdf` must outlive this object.
   OpenMaps(const SsdfVisibility& ssdf, bool both_sides);
 
-  std::uint32_t segment_count() const { return static_cast<std::uint32_t>(ssdf_->sees_nothing.size()); }
+  std::uint32_t segment_count() const {
+    return static_cast<std::uint32_t>(ssdf_->sees_nothing.size());
+  }
   /// The cells of the sphere, or of the upper hemisphere.
   const std::vector<Vec3d>& directions() const { return directions_; }
   const std::vector<double>& solid_angles() const { return solid_angles_; }  // steradians

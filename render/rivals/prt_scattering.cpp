@@ -15,7 +15,8 @@ namespace heddle {
 namespace {
 
 constexpr int kProductOrder = 2 * PrtScattering::kOrder;
-// V, light and incoming harmonic together have degree 20: Gauss's rule needs 11 heights, the azimuth 21 steps.
+// V, light and incoming harmonic together have degree 20: Gauss's rule needs 11 heights, the
+// azimuth 21 steps.
 constexpr int kHeights = kProductOrder + 1;
 constexpr int kAzimuths = 2 * kProductOrder + 1;
 
@@ -34,7 +35,8 @@ Eigen::MatrixXf harmonics_at(int order, const std::vector<Vec3d>& directions) {
 
 }  // namespace
 
-PrtScattering::PrtScattering(const SsdfVisibility& ssdf, bool both_sides, std::span<const BcsdfTable> materials)
+PrtScattering::PrtScattering(const SsdfVisibility& ssdf, bool both_sides,
+                             std::span<const BcsdfTable> materials)
     : materials_(materials) {
   const QuadratureRule heights = gauss_legendre(kHeights, -1, 1);
   std::vector<Vec3d> nodes;
@@ -51,7 +53,8 @@ PrtScattering::PrtScattering(const SsdfVisibility& ssdf, bool both_sides, std::s
   harmonics_ = harmonics_at(kOrder, nodes);
 
   const OpenMaps maps(ssdf, both_sides);
-  Eigen::MatrixXf projection = harmonics_at(kProductOrder, maps.directions());  // [coefficient, cell]
+  // [coefficient, cell]
+  Eigen::MatrixXf projection = harmonics_at(kProductOrder, maps.directions());
   for (Eigen::Index cell = 0; cell < projection.cols(); ++cell) {
     projection.col(cell) *= static_cast<float>(maps.solid_angles()[static_cast<std::size_t>(cell)]);
   }
@@ -62,15 +65,18 @@ PrtScattering::PrtScattering(const SsdfVisibility& ssdf, bool both_sides, std::s
 
   const std::uint32_t segments = maps.segment_count();
   visibility_.resize(static_cast<Eigen::Index>(nodes.size()), segments);
-  tbb::parallel_for(std::uint32_t{0}, (segments + OpenMaps::kBatch - 1) / OpenMaps::kBatch, [&](std::uint32_t batch) {
-    const std::uint32_t first = batch * OpenMaps::kBatch;
-    const std::uint32_t last = std::min(segments, first + OpenMaps::kBatch);
-    const Eigen::MatrixXf coefficients = projection * maps.open(first, last);
-    visibility_.middleCols(first, last - first) = at_nodes.transpose() * coefficients;
-  });
+  tbb::parallel_for(std::uint32_t{0}, (segments + OpenMaps::kBatch - 1) / OpenMaps::kBatch,
+                    [&](std::uint32_t batch) {
+                      const std::uint32_t first = batch * OpenMaps::kBatch;
+                      const std::uint32_t last = std::min(segments, first + OpenMaps::kBatch);
+                      const Eigen::MatrixXf coefficients = projection * maps.open(first, last);
+                      visibility_.middleCols(first, last - first) =
+                          at_nodes.transpose() * coefficients;
+                    });
 }
 
-Eigen::VectorXf PrtScattering::transferred(std::uint32_t segment, const Eigen::VectorXf& light) const {
+Eigen::VectorXf PrtScattering::transferred(std::uint32_t segment,
+                                           const Eigen::VectorXf& light) const {
   const Eigen::VectorXf at_nodes =
       (harmonics_.transpose() * light).array() * visibility_.col(segment).array();
   return harmonics_ * at_nodes;
@@ -82,7 +88,8 @@ Rgb PrtScattering::scattered(const ShadingPoint& point, const Eigen::VectorXf& l
   for (int j = 0; j < sh_count(kOrder); ++j) {
     for (int c = 0; c < 3; ++c) field[static_cast<std::size_t>(3 * j + c)] = incoming[j];
   }
-  return outgoing_from_field(kOrder, field, materials_[point.material], point.tangent.fabric, point.wo.fabric);
+  return outgoing_from_field(kOrder, field, materials_[point.material], point.tangent.fabric,
+                             point.wo.fabric);
 }
 
 Rgb PrtScattering::directional(const ShadingPoint& point, const DirectionPair& light) const {
@@ -91,7 +98,8 @@ Rgb PrtScattering::directional(const ShadingPoint& point, const DirectionPair& l
   return scattered(point, coefficients);
 }
 
-Rgb PrtScattering::spherical_gaussian(const ShadingPoint& point, const DirectionPair& axis, float sharpness) const {
+Rgb PrtScattering::spherical_gaussian(const ShadingPoint& point, const DirectionPair& axis,
+                                      float sharpness) const {
   Eigen::VectorXf coefficients(sh_count(kOrder));
   evaluate_sh(kOrder, axis.fabric, coefficients.data());
   const std::vector<double> band = spherical_bessel_ratios(kOrder, sharpness);

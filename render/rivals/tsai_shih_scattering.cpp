@@ -21,7 +21,8 @@ constexpr float kLeftOut = 1e-3F;
 TsaiShihScattering::TsaiShihScattering(const SsdfVisibility& ssdf, bool both_sides,
                                        std::span<const BcsdfTable> materials, int terms,
                                        BcsdfFactors::Matrix matrix) {
-  for (const BcsdfTable& material : materials) factors_.emplace_back(material.fiber(), terms, matrix);
+  for (const BcsdfTable& material : materials)
+    factors_.emplace_back(material.fiber(), terms, matrix);
   const int lobes = both_sides ? 2 * kLobesPerHemisphere : kLobesPerHemisphere;
   for (const Vec3d& axis :
        fibonacci_axes(both_sides ? FibonacciSet::kSphere : FibonacciSet::kHemisphere, lobes)) {
@@ -34,8 +35,9 @@ TsaiShihScattering::TsaiShihScattering(const SsdfVisibility& ssdf, bool both_sid
   std::vector<double> area(axes_.size(), 0.0);
   for (std::size_t cell = 0; cell < cells; ++cell) {
     const Vec3 w = maps.directions()[cell].cast<float>();
-    const auto best = std::max_element(axes_.begin(), axes_.end(),
-                                       [&](const Vec3& a, const Vec3& b) { return a.dot(w) < b.dot(w); });
+    const auto best =
+        std::max_element(axes_.begin(), axes_.end(),
+                         [&](const Vec3& a, const Vec3& b) { return a.dot(w) < b.dot(w); });
     nearest[cell] = static_cast<std::uint32_t>(best - axes_.begin());
     area[nearest[cell]] += maps.solid_angles()[cell];
   }
@@ -43,22 +45,26 @@ TsaiShihScattering::TsaiShihScattering(const SsdfVisibility& ssdf, bool both_sid
 
   const std::uint32_t segments = maps.segment_count();
   share_.resize(static_cast<std::size_t>(segments) * axes_.size());
-  tbb::parallel_for(std::uint32_t{0}, (segments + OpenMaps::kBatch - 1) / OpenMaps::kBatch, [&](std::uint32_t batch) {
-    const std::uint32_t first = batch * OpenMaps::kBatch;
-    const std::uint32_t last = std::min(segments, first + OpenMaps::kBatch);
-    const Eigen::MatrixXf open = maps.open(first, last);
-    std::vector<double> weight(axes_.size());
-    for (std::uint32_t s = first; s < last; ++s) {
-      std::fill(weight.begin(), weight.end(), 0.0);
-      for (std::size_t cell = 0; cell < cells; ++cell) {
-        if (open(static_cast<Eigen::Index>(cell), s - first) > 0) weight[nearest[cell]] += maps.solid_angles()[cell];
-      }
-      for (std::size_t q = 0; q < axes_.size(); ++q) {
-        share_[s * axes_.size() + q] =
-            area[q] > 0 ? static_cast<std::uint8_t>(std::lround(255 * weight[q] / area[q])) : std::uint8_t{0};
-      }
-    }
-  });
+  tbb::parallel_for(
+      std::uint32_t{0}, (segments + OpenMaps::kBatch - 1) / OpenMaps::kBatch,
+      [&](std::uint32_t batch) {
+        const std::uint32_t first = batch * OpenMaps::kBatch;
+        const std::uint32_t last = std::min(segments, first + OpenMaps::kBatch);
+        const Eigen::MatrixXf open = maps.open(first, last);
+        std::vector<double> weight(axes_.size());
+        for (std::uint32_t s = first; s < last; ++s) {
+          std::fill(weight.begin(), weight.end(), 0.0);
+          for (std::size_t cell = 0; cell < cells; ++cell) {
+            if (open(static_cast<Eigen::Index>(cell), s - first) > 0)
+              weight[nearest[cell]] += maps.solid_angles()[cell];
+          }
+          for (std::size_t q = 0; q < axes_.size(); ++q) {
+            share_[s * axes_.size() + q] =
+                area[q] > 0 ? static_cast<std::uint8_t>(std::lround(255 * weight[q] / area[q]))
+                            : std::uint8_t{0};
+          }
+        }
+      });
 }
 
 float TsaiShihScattering::visibility(std::uint32_t segment, const Vec3& direction) const {
@@ -76,7 +82,8 @@ float TsaiShihScattering::visibility(std::uint32_t segment, const Vec3& directio
 Rgb TsaiShihScattering::directional(const ShadingPoint& point, const DirectionPair& light) const {
   const Mat3 to_fiber = frame_about(point.tangent.fabric).transpose();
   const float visible = visibility(point.segment, light.fabric);
-  return visible * factors_[point.material].value(to_fiber * light.fabric, to_fiber * point.wo.fabric);
+  return visible *
+         factors_[point.material].value(to_fiber * light.fabric, to_fiber * point.wo.fabric);
 }
 
 Rgb TsaiShihScattering::spherical_gaussian(const ShadingPoint& point, const DirectionPair& axis,
@@ -86,7 +93,8 @@ Rgb TsaiShihScattering::spherical_gaussian(const ShadingPoint& point, const Dire
   float most = 0;
   for (std::size_t q = 0; q < axes_.size(); ++q) {
     const float n = (kSharpness * axes_[q] + sharpness * axis.fabric).norm();
-    const float exponent = -kSharpness * sharpness * (axes_[q] - axis.fabric).squaredNorm() / (kSharpness + sharpness + n);
+    const float exponent = -kSharpness * sharpness * (axes_[q] - axis.fabric).squaredNorm() /
+                           (kSharpness + sharpness + n);
     carried[q] = static_cast<float>(share[q]) / 255 * cell_[q] * std::exp(exponent);
     most = std::max(most, carried[q]);
   }

@@ -28,7 +28,8 @@ Vec3d swapped(const Vec3d& w) {
   return {w.z(), w.y(), w.x()};
 }
 
-// [component][column of `data`] the directions of largest variance, by subspace iteration; orthonormal rows.
+// [component][column of `data`] the directions of largest variance, by subspace iteration;
+// orthonormal rows.
 Matrix principal_components(const Matrix& data, Eigen::Index count) {
   constexpr int kSpare = 8;
   constexpr int kIterations = 4;
@@ -38,16 +39,19 @@ Matrix principal_components(const Matrix& data, Eigen::Index count) {
   for (Eigen::Index k = 0; k < space.size(); ++k) space.data()[k] = random.uniform() - 0.5F;
   for (int k = 0; k < kIterations; ++k) {
     const Eigen::MatrixXf image = data.transpose() * (data * space);
-    space = Eigen::HouseholderQR<Eigen::MatrixXf>(image).householderQ() * Eigen::MatrixXf::Identity(data.cols(), tried);
+    space = Eigen::HouseholderQR<Eigen::MatrixXf>(image).householderQ() *
+            Eigen::MatrixXf::Identity(data.cols(), tried);
   }
   const Eigen::MatrixXd within = (data * space).cast<double>();
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(within.transpose() * within);
-  return (space * solver.eigenvectors().rightCols(count).rowwise().reverse().cast<float>()).transpose();
+  return (space * solver.eigenvectors().rightCols(count).rowwise().reverse().cast<float>())
+      .transpose();
 }
 
 }  // namespace
 
-DistanceMaps::DistanceMaps(std::span<const Mat3> frames, const Visible& visible, const DistanceMapSettings& settings,
+DistanceMaps::DistanceMaps(std::span<const Mat3> frames, const Visible& visible,
+                           const DistanceMapSettings& settings,
                            const std::function<void()>& vertex_done)
     : resolution_(settings.resolution) {
   assert(!frames.empty() && settings.resolution >= 4 && settings.terms >= 0);
@@ -72,8 +76,8 @@ DistanceMaps::DistanceMaps(std::span<const Mat3> frames, const Visible& visible,
     if (vertex_done) vertex_done();
   });
 
-  // Components over the vertices, cells weighted by solid angle; below the horizon, where only the far ends of Gaussians
-  // are evaluated, by a tenth of it.
+  // Components over the vertices, cells weighted by solid angle; below the horizon, where only the
+  // far ends of Gaussians are evaluated, by a tenth of it.
   Eigen::RowVectorXf weight(cells);
   double whole = 0;
   for (int row = 0, k = 0; row < resolution_; ++row) {
@@ -89,7 +93,8 @@ DistanceMaps::DistanceMaps(std::span<const Mat3> frames, const Visible& visible,
   const Matrix components = terms > 0 ? principal_components(scaled, terms) : Matrix(0, cells);
   const Matrix shares = scaled * components.transpose();  // [vertex][component]
   scaled -= shares * components;
-  compression_error_ = std::sqrt(static_cast<double>(scaled.squaredNorm()) / (whole * static_cast<double>(vertices)));
+  compression_error_ = std::sqrt(static_cast<double>(scaled.squaredNorm()) /
+                                 (whole * static_cast<double>(vertices)));
 
   stride_ = (static_cast<std::size_t>(terms) + 1 + 7) / 8 * 8;
   basis_.assign(static_cast<std::size_t>(cells) * stride_, 0.0F);
@@ -106,7 +111,8 @@ DistanceMaps::DistanceMaps(std::span<const Mat3> frames, const Visible& visible,
   }
 }
 
-void DistanceMaps::write(const std::filesystem::path& path, const std::map<std::string, std::string>& metadata) const {
+void DistanceMaps::write(const std::filesystem::path& path,
+                         const std::map<std::string, std::string>& metadata) const {
   const auto rows = static_cast<std::uint64_t>(resolution_);
   TensorFileWriter file;
   for (const auto& [key, value] : metadata) file.set_metadata(key, value);
@@ -120,8 +126,8 @@ void DistanceMaps::write(const std::filesystem::path& path, const std::map<std::
 DistanceMaps DistanceMaps::read(const std::filesystem::path& path, std::size_t vertices) {
   const TensorFile file = TensorFile::read(path);
   const std::vector<std::uint64_t> shape = file.shape("basis");
-  if (shape.size() != 3 || shape[0] != shape[1] || shape[0] < 4 || shape[0] > 4096 || shape[2] == 0 ||
-      shape[2] % 8 != 0) {
+  if (shape.size() != 3 || shape[0] != shape[1] || shape[0] < 4 || shape[0] > 4096 ||
+      shape[2] == 0 || shape[2] % 8 != 0) {
     throw FileError(path.string() + ": 'basis' is not [resolution][resolution][multiple of 8]");
   }
   DistanceMaps maps;
@@ -133,7 +139,8 @@ DistanceMaps DistanceMaps::read(const std::filesystem::path& path, std::size_t v
   return maps;
 }
 
-SignedDistance DistanceMaps::evaluate(std::span<const float> coefficients, const Vec3d& direction) const {
+SignedDistance DistanceMaps::evaluate(std::span<const float> coefficients,
+                                      const Vec3d& direction) const {
   assert(coefficients.size() == stride_);
   const Vec3d w = swapped(direction);
   const double step_polar = kPi / resolution_;
@@ -152,7 +159,8 @@ SignedDistance DistanceMaps::evaluate(std::span<const float> coefficients, const
     const float* const basis = &basis_[(static_cast<std::size_t>(i) * resolution_ + j) * stride_];
     return static_cast<double>(
         Eigen::Map<const Eigen::VectorXf>(basis, static_cast<Eigen::Index>(stride_))
-            .dot(Eigen::Map<const Eigen::VectorXf>(coefficients.data(), static_cast<Eigen::Index>(stride_))));
+            .dot(Eigen::Map<const Eigen::VectorXf>(coefficients.data(),
+                                                   static_cast<Eigen::Index>(stride_))));
   };
   const double v00 = cell(r, c0);
   const double v01 = cell(r, c1);
@@ -166,18 +174,23 @@ SignedDistance DistanceMaps::evaluate(std::span<const float> coefficients, const
   const Vec3d along_polar(w.x() / sine * w.z(), w.y() / sine * w.z(), -sine);
   const Vec3d gradient = swapped(by_polar * along_polar + by_azimuth * along_azimuth);
   const double length = gradient.norm();
-  return {std::lerp(upper, lower, down), length > 1e-6 ? Vec3d(gradient / length) : Vec3d(Vec3d::Zero())};
+  return {std::lerp(upper, lower, down),
+          length > 1e-6 ? Vec3d(gradient / length) : Vec3d(Vec3d::Zero())};
 }
 
-SignedDistance8 DistanceMaps::evaluate(std::span<const float> coefficients, const Vec8& directions) const {
+SignedDistance8 DistanceMaps::evaluate(std::span<const float> coefficients,
+                                       const Vec8& directions) const {
   assert(coefficients.size() == stride_);
   const Vec8 w = {directions.z, directions.y, directions.x};
   const float step_polar = kPif / static_cast<float>(resolution_);
   const float step_azimuth = 2 * step_polar;
   const Float8 sine = max8(sqrt8(w.x * w.x + w.y * w.y), splat8(1e-7F));
   const Float8 row = atan2_8(sine, w.z) * (1 / step_polar) - 0.5F;
-  const Float8 column = atan2_8(w.y, w.x) * (1 / step_azimuth) + (static_cast<float>(resolution_) - 0.5F);  // > 0
-  const Int8 r = __builtin_convertvector(max8(min8(row, splat8(static_cast<float>(resolution_ - 2))), Float8{}), Int8);
+  // > 0
+  const Float8 column =
+      atan2_8(w.y, w.x) * (1 / step_azimuth) + (static_cast<float>(resolution_) - 0.5F);
+  const Int8 r = __builtin_convertvector(
+      max8(min8(row, splat8(static_cast<float>(resolution_ - 2))), Float8{}), Int8);
   const Int8 c = __builtin_convertvector(column, Int8);
   const Float8 down = row - __builtin_convertvector(r, Float8);
   const Float8 across = column - __builtin_convertvector(c, Float8);
@@ -210,9 +223,11 @@ SignedDistance8 DistanceMaps::evaluate(std::span<const float> coefficients, cons
   const Float8 cosine_azimuth = w.x / sine;
   const Float8 sine_azimuth = w.y / sine;
   const Vec8 swapped_gradient = {by_polar * cosine_azimuth * w.z - by_azimuth * sine_azimuth,
-                                 by_polar * sine_azimuth * w.z + by_azimuth * cosine_azimuth, -by_polar * sine};
-  const Float8 length = sqrt8(swapped_gradient.x * swapped_gradient.x + swapped_gradient.y * swapped_gradient.y +
-                              swapped_gradient.z * swapped_gradient.z);
+                                 by_polar * sine_azimuth * w.z + by_azimuth * cosine_azimuth,
+                                 -by_polar * sine};
+  const Float8 length =
+      sqrt8(swapped_gradient.x * swapped_gradient.x + swapped_gradient.y * swapped_gradient.y +
+            swapped_gradient.z * swapped_gradient.z);
   const Float8 scale = length > 1e-6F ? 1 / length : Float8{};
   return {upper + down * (lower - upper),
           {scale * swapped_gradient.z, scale * swapped_gradient.y, scale * swapped_gradient.x}};
@@ -227,8 +242,8 @@ VisibilityLine visibility_line(const SignedDistance& at, double cos_theta, const
   return {at.distance / length, theta / length, phi / length};
 }
 
-VisibilityLine8 visibility_line(const SignedDistance8& at, Float8 cos_theta, const Vec8& along_theta,
-                                const Vec8& along_phi) {
+VisibilityLine8 visibility_line(const SignedDistance8& at, Float8 cos_theta,
+                                const Vec8& along_theta, const Vec8& along_phi) {
   const Vec8& g = at.gradient;
   const Float8 theta = g.x * along_theta.x + g.y * along_theta.y + g.z * along_theta.z;
   const Float8 phi = (g.x * along_phi.x + g.y * along_phi.y + g.z * along_phi.z) * cos_theta;

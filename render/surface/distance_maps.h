@@ -1,15 +1,16 @@
 #ifndef HEDDLE_RENDER_SURFACE_DISTANCE_MAPS_H_
 #define HEDDLE_RENDER_SURFACE_DISTANCE_MAPS_H_
-// What every vertex of a cloth sees of its surroundings, as signed distances: Iwasaki et al. 2014, section 3.2. Positive
-// where a direction is visible, the angle to the nearest direction of the other kind, compressed over the vertices by
-// principal components (the paper's 48).
+// What every vertex of a cloth sees of its surroundings, as signed distances: Iwasaki et al. 2014,
+// section 3.2. Positive where a direction is visible, the angle to the nearest direction of the
+// other kind, compressed over the vertices by principal components (the paper's 48).
 //
-// Directions are in the patch frame of the vertex: x = thread 1, y = thread 2, z = the normal; below the horizon all is
-// hidden. One map serves all tangents of both threads: distance and gradient are geodesic, on the sphere, and
-// visibility_line() turns them into the theta and phi of any thread frame. (The paper measures in theta and phi themselves,
-// which would take a map per tangent.) Maps are latitude-longitude about x, so theta and phi of a flat thread 1: their
-// poles lie at the ends of that thread, on the horizon, and the zenith is an ordinary point.
-// Thread-safe once built. Tested in tests/render/surface/distance_maps_test.cpp.
+// Directions are in the patch frame of the vertex: x = thread 1, y = thread 2, z = the normal;
+// below the horizon all is hidden. One map serves all tangents of both threads: distance and
+// gradient are geodesic, on the sphere, and visibility_line() turns them into the theta and phi of
+// any thread frame. (The paper measures in theta and phi themselves, which would take a map per
+// tangent.) Maps are latitude-longitude about x, so theta and phi of a flat thread 1: their poles
+// lie at the ends of that thread, on the horizon, and the zenith is an ordinary point. Thread-safe
+// once built. Tested in tests/render/surface/distance_maps_test.cpp.
 
 #include <filesystem>
 #include <functional>
@@ -40,20 +41,23 @@ struct SignedDistance8 {
 
 class DistanceMaps {
  public:
-  /// Is a point of the cloth open towards a direction, both in world space? Called from several threads.
+  /// Is a point of the cloth open towards a direction, both in world space? Called from several
+  /// threads.
   using Visible = std::function<bool(std::uint32_t vertex, const Vec3& direction)>;
 
-  /// frames [vertex]: world = frame * patch, columns thread 1, thread 2, normal. vertex_done is called after each, from any
-  /// thread; it may throw to stop.
-  DistanceMaps(std::span<const Mat3> frames, const Visible& visible, const DistanceMapSettings& settings,
-               const std::function<void()>& vertex_done = {});
+  /// frames [vertex]: world = frame * patch, columns thread 1, thread 2, normal. vertex_done is
+  /// called after each, from any thread; it may throw to stop.
+  DistanceMaps(std::span<const Mat3> frames, const Visible& visible,
+               const DistanceMapSettings& settings, const std::function<void()>& vertex_done = {});
 
-  void write(const std::filesystem::path& path, const std::map<std::string, std::string>& metadata) const;
+  void write(const std::filesystem::path& path,
+             const std::map<std::string, std::string>& metadata) const;
   /// Maps of so many vertices. Errors: FileError, also where there are others.
   static DistanceMaps read(const std::filesystem::path& path, std::size_t vertices);
 
   std::size_t vertex_count() const { return coefficients_.size() / stride_; }
-  /// Coefficients of a vertex, [stride()]. Those of a point between vertices are their linear interpolation.
+  /// Coefficients of a vertex, [stride()]. Those of a point between vertices are their linear
+  /// interpolation.
   std::span<const float> coefficients(std::uint32_t vertex) const {
     return {&coefficients_[static_cast<std::size_t>(vertex) * stride_], stride_};
   }
@@ -74,19 +78,21 @@ class DistanceMaps {
   DistanceMaps() = default;
 
   int resolution_ = 0;
-  std::size_t stride_ = 0;           // 1 for the mean map, then the components, padded with 0 to a multiple of 8
+  // 1 for the mean map, then the components, padded with 0 to a multiple of 8
+  std::size_t stride_ = 0;
   std::vector<float> basis_;         // [row][column][stride]
   std::vector<float> coefficients_;  // [vertex][stride]
   double compression_error_ = 0;
 };
 
-/// The distance at a direction as a line in the theta and phi of a thread frame whose angles there are `theta` and, with
-/// d direction / d theta and d direction / (cos theta d phi), the two unit vectors. Widths of Gaussians about the direction
-/// are measured from it. All is visible or hidden where there is no gradient.
+/// The distance at a direction as a line in the theta and phi of a thread frame whose angles there
+/// are `theta` and, with d direction / d theta and d direction / (cos theta d phi), the two unit
+/// vectors. Widths of Gaussians about the direction are measured from it. All is visible or hidden
+/// where there is no gradient.
 VisibilityLine visibility_line(const SignedDistance& at, double cos_theta, const Vec3d& along_theta,
                                const Vec3d& along_phi);
-VisibilityLine8 visibility_line(const SignedDistance8& at, Float8 cos_theta, const Vec8& along_theta,
-                                const Vec8& along_phi);
+VisibilityLine8 visibility_line(const SignedDistance8& at, Float8 cos_theta,
+                                const Vec8& along_theta, const Vec8& along_phi);
 
 }  // namespace heddle
 

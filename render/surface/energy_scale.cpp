@@ -11,10 +11,12 @@ Vec3d lattice_point(int n) {
   // Roberts' generalised golden ratio of three dimensions: the root of x^4 = x + 1.
   constexpr double kRatio = 1.2207440846057596;
   const auto coordinate = [n](double step) { return std::fmod((n + 0.5) * step, 1.0); };
-  return {coordinate(1 / kRatio), coordinate(1 / (kRatio * kRatio)), coordinate(1 / (kRatio * kRatio * kRatio))};
+  return {coordinate(1 / kRatio), coordinate(1 / (kRatio * kRatio)),
+          coordinate(1 / (kRatio * kRatio * kRatio))};
 }
 
-EnergyScale::EnergyScale(const std::function<double(const Vec3d& w)>& load) : load_(kRows * kColumns) {
+EnergyScale::EnergyScale(const std::function<double(const Vec3d& w)>& load)
+    : load_(kRows * kColumns) {
   tbb::parallel_for(0, kRows * kColumns, [&](int k) {
     const double share = static_cast<double>(k / kColumns) / (kRows - 1);
     const double elevation = std::max(1e-4, kPi / 2 * share * share);
@@ -32,7 +34,9 @@ double EnergyScale::operator()(const Vec3d& w) const {
   if (column < 0) column += kColumns;
   const int r = std::min(static_cast<int>(row), kRows - 2);
   const int c = static_cast<int>(column);
-  const auto at = [&](int i, int j) { return load_[static_cast<std::size_t>(i * kColumns + j % kColumns)]; };
+  const auto at = [&](int i, int j) {
+    return load_[static_cast<std::size_t>(i * kColumns + j % kColumns)];
+  };
   const double low = std::lerp(at(r, c), at(r, c + 1), column - c);
   const double high = std::lerp(at(r + 1, c), at(r + 1, c + 1), column - c);
   const double load = std::lerp(low, high, row - r);

@@ -49,17 +49,20 @@ Average average_over(const CircularGaussian& gaussian) {
   // Over 4 degrees smooth factors change by less than what else is neglected.
   if (gaussian.width < 0.07) return one_node(gaussian.mean);
   static const QuadratureRule& rule = gauss_legendre(kSide);
-  const double reach = gaussian.width < 1.1 ? 2 * std::asin(0.9 * gaussian.width) : kPi;  // 1.8 widths
+  // 1.8 widths
+  const double reach = gaussian.width < 1.1 ? 2 * std::asin(0.9 * gaussian.width) : kPi;
   const double begin = std::clamp(gaussian.mean - reach, -kHalfPi, kHalfPi);
   const double end = std::clamp(gaussian.mean + reach, -kHalfPi, kHalfPi);
   Average result;
-  result.at = 0.5 * (begin + end) + 0.5 * (end - begin) * Eigen::Map<const Nodes>(rule.nodes.data());
+  result.at =
+      0.5 * (begin + end) + 0.5 * (end - begin) * Eigen::Map<const Nodes>(rule.nodes.data());
   const Nodes half = 0.5 * (result.at - gaussian.mean);
   // sin 2x = 2 sin x cos x: means lie up to half a turn from 0, so that |half| <= 3 pi / 4.
   const Nodes quarter = sine_of_quarter(Nodes(0.5 * half));
   const Nodes sine = 4 / gaussian.width * quarter * (1 - quarter.square()).sqrt();
   const Nodes exponent = -sine * sine;
-  result.weight = Eigen::Map<const Nodes>(rule.weights.data()) * (exponent - exponent.maxCoeff()).exp();
+  result.weight =
+      Eigen::Map<const Nodes>(rule.weights.data()) * (exponent - exponent.maxCoeff()).exp();
   result.weight /= result.weight.sum();
   return result;
 }
@@ -68,7 +71,8 @@ Average average_over(const CircularGaussian& gaussian) {
 SignedDistance distance_to_horizon(const Vec3d& direction) {
   const Vec3d up = Vec3d(0, 0, 1) - direction.z() * direction;
   const double length = up.norm();
-  return {std::asin(std::clamp(direction.z(), -1.0, 1.0)), length > 1e-9 ? Vec3d(up / length) : Vec3d(Vec3d::Zero())};
+  return {std::asin(std::clamp(direction.z(), -1.0, 1.0)),
+          length > 1e-9 ? Vec3d(up / length) : Vec3d(Vec3d::Zero())};
 }
 
 Nodes cosine_of(const Nodes& x) {  // |x| <= pi
@@ -78,7 +82,8 @@ Nodes cosine_of(const Nodes& x) {  // |x| <= pi
 
 }  // namespace
 
-/// A thread's lobe in theta: amplitude gc(theta_i; -theta_o, width); the isotropic part has infinite width.
+/// A thread's lobe in theta: amplitude gc(theta_i; -theta_o, width); the isotropic part has
+/// infinite width.
 struct InteractiveMicrocylinder::Lobe {
   double width;
   double amplitude;
@@ -92,14 +97,16 @@ struct InteractiveMicrocylinder::Tangent {
   std::array<Lobe, 3> lobes;
 };
 
-std::array<InteractiveMicrocylinder::Lobe, 3> InteractiveMicrocylinder::lobes_of(const ThreadScattering& scattering) {
-  // g(theta_h) of deviation d is gc(theta_i; -theta_o, sqrt(8) d) / (sqrt(2 pi) d) to a good approximation.
+std::array<InteractiveMicrocylinder::Lobe, 3> InteractiveMicrocylinder::lobes_of(
+    const ThreadScattering& scattering) {
+  // g(theta_h) of deviation d is gc(theta_i; -theta_o, sqrt(8) d) / (sqrt(2 pi) d) to a good
+  // approximation.
   const auto lobe_of = [](double deviation, double share, bool surface) {
     return Lobe{std::sqrt(8.0) * deviation, share / (std::sqrt(2 * kPi) * deviation), surface};
   };
   const double kd = scattering.parameters().kd;
-  return {lobe_of(scattering.surface_deviation(), 1, true), lobe_of(scattering.volume_deviation(), 1 - kd, false),
-          Lobe{kWidest, kd, false}};
+  return {lobe_of(scattering.surface_deviation(), 1, true),
+          lobe_of(scattering.volume_deviation(), 1 - kd, false), Lobe{kWidest, kd, false}};
 }
 
 /// The product of a light and a lobe, as two Gaussians in the angles of a tangent.
@@ -114,8 +121,8 @@ struct InteractiveMicrocylinder::Around {
     return {std::clamp(theta.mean, -edge, edge), std::clamp(phi.mean, -kHalfPi, kHalfPi)};
   }
   Vec3d direction(const Angles& at) const {
-    return frame *
-           Vec3d(std::sin(at.theta), std::cos(at.theta) * std::sin(at.phi), std::cos(at.theta) * std::cos(at.phi));
+    return frame * Vec3d(std::sin(at.theta), std::cos(at.theta) * std::sin(at.phi),
+                         std::cos(at.theta) * std::cos(at.phi));
   }
 };
 
@@ -123,11 +130,12 @@ InteractiveMicrocylinder::InteractiveMicrocylinder(const MicrocylinderFabric& fa
                                                    const InteractiveSettings& settings)
     : InteractiveMicrocylinder(
           fabric, settings,
-          WeightingTable(fabric, tangent_samples(fabric, settings.most_tangents), settings.weighting, settings.table)) {
-}
+          WeightingTable(fabric, tangent_samples(fabric, settings.most_tangents),
+                         settings.weighting, settings.table)) {}
 
 InteractiveMicrocylinder::InteractiveMicrocylinder(const MicrocylinderFabric& fabric,
-                                                   const InteractiveSettings& settings, WeightingTable table)
+                                                   const InteractiveSettings& settings,
+                                                   WeightingTable table)
     : fabric_(fabric),
       settings_(settings),
       samples_(tangent_samples(fabric, settings.most_tangents)),
@@ -139,7 +147,8 @@ InteractiveMicrocylinder::InteractiveMicrocylinder(const MicrocylinderFabric& fa
 
 InteractiveMicrocylinder::~InteractiveMicrocylinder() = default;
 
-void InteractiveMicrocylinder::set_scattering(std::size_t thread, const ThreadParameters& parameters) {
+void InteractiveMicrocylinder::set_scattering(std::size_t thread,
+                                              const ThreadParameters& parameters) {
   assert(thread < fabric_.threads.size());
   fabric_.threads[thread].scattering = parameters;
   prepare();
@@ -148,10 +157,13 @@ void InteractiveMicrocylinder::set_scattering(std::size_t thread, const ThreadPa
 void InteractiveMicrocylinder::prepare() {
   tangents_.clear();
   for (const TangentSample& sample : samples_) {
-    ThreadParameters parameters = fabric_.threads[static_cast<std::size_t>(sample.thread)].scattering;
+    ThreadParameters parameters =
+        fabric_.threads[static_cast<std::size_t>(sample.thread)].scattering;
     if (!settings_.printed) {
-      // theta_h turns with the tangent, so the mean over a piece is nearly a lobe of larger variance.
-      const bool deviations = fabric_.conventions.width == ThreadConventions::Width::kStandardDeviation;
+      // theta_h turns with the tangent, so the mean over a piece is nearly a lobe of larger
+      // variance.
+      const bool deviations =
+          fabric_.conventions.width == ThreadConventions::Width::kStandardDeviation;
       const double spread = (deviations ? 1 : std::sqrt(2.0)) * sample.deviation;
       parameters.gamma_s = std::hypot(parameters.gamma_s, spread);
       parameters.gamma_v = std::hypot(parameters.gamma_v, spread);
@@ -162,51 +174,59 @@ void InteractiveMicrocylinder::prepare() {
 }
 
 Rgbd InteractiveMicrocylinder::reflected(const Vec3d& wi, const Vec3d& wo) const {
-  const std::vector<double> weights = thread_weights(fabric_, samples_, settings_.weighting, wi, wo);
+  const std::vector<double> weights =
+      thread_weights(fabric_, samples_, settings_.weighting, wi, wo);
   Rgbd sum = Rgbd::Zero();
   for (std::size_t t = 0; t < weights.size(); ++t) {
     if (weights[t] == 0) continue;
     const Angles i = angles_of(tangents_[t].frame.transpose() * wi);
     const Angles o = angles_of(tangents_[t].frame.transpose() * wo);
-    sum += weights[t] * std::cos(i.theta) * tangents_[t].scattering.value(i.theta, i.phi, o.theta, o.phi);
+    sum += weights[t] * std::cos(i.theta) *
+           tangents_[t].scattering.value(i.theta, i.phi, o.theta, o.phi);
   }
   return sum;
 }
 
-double InteractiveMicrocylinder::clipped(const Around& around, const PointVisibility& visibility) const {
+double InteractiveMicrocylinder::clipped(const Around& around,
+                                         const PointVisibility& visibility) const {
   const Angles at = around.inside();
   const double cos_theta = std::cos(at.theta);
   const double sin_theta = std::sin(at.theta);
   const double cos_phi = std::cos(at.phi);
   const double sin_phi = std::sin(at.phi);
   const Vec3d direction = around.direction(at);
-  const SignedDistance distance = visibility.maps == nullptr
-                                      ? distance_to_horizon(direction)
-                                      : visibility.maps->evaluate(visibility.coefficients, direction);
+  const SignedDistance distance =
+      visibility.maps == nullptr ? distance_to_horizon(direction)
+                                 : visibility.maps->evaluate(visibility.coefficients, direction);
   VisibilityLine line =
-      visibility_line(distance, cos_theta, around.frame * Vec3d(cos_theta, -sin_theta * sin_phi, -sin_theta * cos_phi),
+      visibility_line(distance, cos_theta,
+                      around.frame * Vec3d(cos_theta, -sin_theta * sin_phi, -sin_theta * cos_phi),
                       around.frame * Vec3d(0, cos_phi, -sin_phi));
-  line.distance +=
-      line.theta_gradient * (around.theta.mean - at.theta) + line.phi_gradient * (around.phi.mean - at.phi);
+  line.distance += line.theta_gradient * (around.theta.mean - at.theta) +
+                   line.phi_gradient * (around.phi.mean - at.phi);
   if (!settings_.printed) return clipped_gaussians(around.theta, around.phi, line);
-  const double gain = gains_->gain(around.theta.width, around.phi.width, line.theta_gradient, line.phi_gradient);
-  return unoccluded_gaussians_printed(around.theta, around.phi) / (1 + std::exp(-gain * line.distance));
+  const double gain =
+      gains_->gain(around.theta.width, around.phi.width, line.theta_gradient, line.phi_gradient);
+  return unoccluded_gaussians_printed(around.theta, around.phi) /
+         (1 + std::exp(-gain * line.distance));
 }
 
-Rgbd InteractiveMicrocylinder::directional_light(const Mat3d& frame, const Vec3d& out, std::span<const Light> lights,
+Rgbd InteractiveMicrocylinder::directional_light(const Mat3d& frame, const Vec3d& out,
+                                                 std::span<const Light> lights,
                                                  const PointVisibility& visibility) const {
   Rgbd radiance = Rgbd::Zero();
   for (const Light& light : lights) {
     if (!light.is_directional()) continue;
     const Vec3d wi = frame.transpose() * light.axis.cast<double>();
-    const bool visible =
-        visibility.maps == nullptr || visibility.maps->evaluate(visibility.coefficients, wi).distance > 0;
+    const bool visible = visibility.maps == nullptr ||
+                         visibility.maps->evaluate(visibility.coefficients, wi).distance > 0;
     if (visible) radiance += light.irradiance.cast<double>() * reflected(wi, out);
   }
   return radiance;
 }
 
-Rgbd InteractiveMicrocylinder::shade_in_double(const Mat3d& frame, const Vec3d& wo, std::span<const Light> lights,
+Rgbd InteractiveMicrocylinder::shade_in_double(const Mat3d& frame, const Vec3d& wo,
+                                               std::span<const Light> lights,
                                                const PointVisibility& visibility) const {
   const Vec3d out = frame.transpose() * wo;
   if (out.z() <= 0) return Rgbd::Zero();
@@ -229,12 +249,14 @@ Rgbd InteractiveMicrocylinder::shade_in_double(const Mat3d& frame, const Vec3d& 
       Rgbd sum = Rgbd::Zero();
       for (const Lobe& lobe : tangent.lobes) {
         if (lobe.amplitude == 0) continue;
-        const CircularGaussianProduct product = circular_gaussian_product(theta_k, {-o.theta, lobe.width});
+        const CircularGaussianProduct product =
+            circular_gaussian_product(theta_k, {-o.theta, lobe.width});
         if (product.amplitude < kNegligible) continue;
         const double theta_l = product.gaussian.mean;
-        const Around around{tangent.frame,
-                            {theta_l, std::min(product.gaussian.width, kWidest)},
-                            {k.phi, std::min(azimuthal_width(theta_k.width, theta_l, k.theta), kWidest)}};
+        const Around around{
+            tangent.frame,
+            {theta_l, std::min(product.gaussian.width, kWidest)},
+            {k.phi, std::min(azimuthal_width(theta_k.width, theta_l, k.theta), kWidest)}};
         const double integral = clipped(around, visibility);
         if (integral <= 0) continue;
 
@@ -244,7 +266,8 @@ Rgbd InteractiveMicrocylinder::shade_in_double(const Mat3d& frame, const Vec3d& 
         if (settings_.printed) {
           weight = table_.value(t, outgoing, axis, sharpness);
           theta = one_node(theta_l);
-          phi = {Nodes::Constant(o.phi + std::remainder(k.phi - o.phi, 2 * kPi)), Nodes::Constant(1.0 / kSide)};
+          phi = {Nodes::Constant(o.phi + std::remainder(k.phi - o.phi, 2 * kPi)),
+                 Nodes::Constant(1.0 / kSide)};
         } else {
           const Angles at = around.inside();
           const double across = around.phi.width * std::cos(at.theta);
@@ -255,7 +278,8 @@ Rgbd InteractiveMicrocylinder::shade_in_double(const Mat3d& frame, const Vec3d& 
         }
         if (weight <= 0) continue;
 
-        // Smooth factors on the grid of nodes: cos^2 theta_i / cos^2 theta_d and what depends on both angles.
+        // Smooth factors on the grid of nodes: cos^2 theta_i / cos^2 theta_d and what depends on
+        // both angles.
         const Nodes cos_theta = cosine_of(theta.at);
         const Nodes cos_theta_d = cosine_of(Nodes(0.5 * (theta.at - o.theta)));
         Nodes along = theta.weight * cos_theta.square() / cos_theta_d.square().max(1e-12);
@@ -263,8 +287,10 @@ Rgbd InteractiveMicrocylinder::shade_in_double(const Mat3d& frame, const Vec3d& 
         const Nodes cos_half_phi_d =
             cosine_of(Nodes(0.5 * (phi.at - o.phi)));  // both in the domain: within half a turn
         Lanes<kGrid> cosine;
-        for (int a = 0; a < kSide; ++a) cosine.segment<kSide>(a * kSide) = cos_theta_d[a] * cos_half_phi_d;
-        const Lanes<kGrid> reflectance = fresnel_reflectance<kGrid>(parameters.ior, cosine.max(0.0));
+        for (int a = 0; a < kSide; ++a)
+          cosine.segment<kSide>(a * kSide) = cos_theta_d[a] * cos_half_phi_d;
+        const Lanes<kGrid> reflectance =
+            fresnel_reflectance<kGrid>(parameters.ior, cosine.max(0.0));
         double smooth = 0;
         for (int a = 0; a < kSide; ++a) {
           const Nodes fresnel = reflectance.segment<kSide>(a * kSide);
@@ -291,7 +317,8 @@ Rgbd InteractiveMicrocylinder::shade_in_double(const Mat3d& frame, const Vec3d& 
 
 namespace {
 
-// Terms (lights times lobes) of one tangent that shade() computes eight at a time, one array for each quantity.
+// Terms (lights times lobes) of one tangent that shade() computes eight at a time, one array for
+// each quantity.
 struct Terms {
   static constexpr std::size_t kQuantities = 9;
   enum Quantity : std::size_t {
@@ -317,7 +344,8 @@ struct Terms {
   Float8 get(Quantity quantity, std::size_t first) const { return load8(&values[quantity][first]); }
 };
 
-// What shade() knows of the Gaussian lights, [light] padded to eights: axes in the patch frame, sharpness / 2, colour over mass.
+// What shade() knows of the Gaussian lights, [light] padded to eights: axes in the patch frame,
+// sharpness / 2, colour over mass.
 struct LightLanes {
   std::vector<float> x, y, z, half_sharpness, brightness;
   std::vector<Rgbd> colour;
@@ -326,7 +354,8 @@ struct LightLanes {
     x.push_back(static_cast<float>(axis.x()));
     y.push_back(static_cast<float>(axis.y()));
     z.push_back(static_cast<float>(axis.z()));
-    half_sharpness.push_back(static_cast<float>(std::max(0.5 * sharpness, 1 / (kWidest * kWidest))));
+    half_sharpness.push_back(
+        static_cast<float>(std::max(0.5 * sharpness, 1 / (kWidest * kWidest))));
     brightness.push_back(static_cast<float>(radiance.maxCoeff()));
     colour.push_back(radiance);
   }
@@ -355,7 +384,8 @@ struct Average8 {
 Average8 average8(Float8 mean, Float8 width) {
   static const QuadratureRule& rule = gauss_legendre(kSide);
   const Float8 half_sine = min8(0.9F * width, splat8(0.999F));
-  const Float8 reach = width < 1.1F ? 2 * atan2_8(half_sine, sqrt8(1 - half_sine * half_sine)) : splat8(kPif);
+  const Float8 reach =
+      width < 1.1F ? 2 * atan2_8(half_sine, sqrt8(1 - half_sine * half_sine)) : splat8(kPif);
   constexpr float kHalf = 0.5F * kPif;
   const Float8 begin = max8(min8(mean - reach, splat8(kHalf)), splat8(-kHalf));
   const Float8 end = max8(min8(mean + reach, splat8(kHalf)), splat8(-kHalf));
@@ -379,7 +409,8 @@ Average8 average8(Float8 mean, Float8 width) {
 
 }  // namespace
 
-Rgbd InteractiveMicrocylinder::shade(const Mat3d& frame, const Vec3d& wo, std::span<const Light> lights,
+Rgbd InteractiveMicrocylinder::shade(const Mat3d& frame, const Vec3d& wo,
+                                     std::span<const Light> lights,
                                      const PointVisibility& visibility) const {
   if (settings_.printed) return shade_in_double(frame, wo, lights, visibility);
   const Vec3d out = frame.transpose() * wo;
@@ -413,10 +444,11 @@ Rgbd InteractiveMicrocylinder::shade(const Mat3d& frame, const Vec3d& wo, std::s
     const auto cos_o = static_cast<float>(std::sqrt(std::max(0.0, 1 - o.x() * o.x())));
     const Mat3 to_thread = tangent.frame.transpose().cast<float>();
     const auto albedo = static_cast<float>(tangent.scattering.parameters().albedo.maxCoeff());
-    const auto share =
-        static_cast<float>(fabric_.threads[static_cast<std::size_t>(tangent.thread)].share * samples_[t].share);
+    const auto share = static_cast<float>(
+        fabric_.threads[static_cast<std::size_t>(tangent.thread)].share * samples_[t].share);
     for (std::size_t first = 0; first < padded; first += kFloat8Lanes) {
-      const Vec8 axis = {load8(&gaussians.x[first]), load8(&gaussians.y[first]), load8(&gaussians.z[first])};
+      const Vec8 axis = {load8(&gaussians.x[first]), load8(&gaussians.y[first]),
+                         load8(&gaussians.z[first])};
       const Float8 w_k = load8(&gaussians.half_sharpness[first]);
       const auto component = [&](int row) {
         return to_thread(row, 0) * axis.x + to_thread(row, 1) * axis.y + to_thread(row, 2) * axis.z;
@@ -425,10 +457,12 @@ Rgbd InteractiveMicrocylinder::shade(const Mat3d& frame, const Vec3d& wo, std::s
       const Float8 across = component(1);
       const Float8 normal = component(2);
       const Float8 cos_k = max8(sqrt8(across * across + normal * normal), splat8(1e-9F));
-      // No more of the light than this reaches what lies above the surface, and above the thread's own horizon.
+      // No more of the light than this reaches what lies above the surface, and above the thread's
+      // own horizon.
       const Float8 above = sqrt8(max8(1 - axis.z * axis.z, Float8{}));
       const Float8 beside = sqrt8(sin_k * sin_k + across * across);
-      const Float8 hidden = 2 * w_k * (min8(axis.z < 0 ? above - 1 : Float8{}, normal < 0 ? beside - 1 : Float8{}));
+      const Float8 hidden =
+          2 * w_k * (min8(axis.z < 0 ? above - 1 : Float8{}, normal < 0 ? beside - 1 : Float8{}));
       const Float8 light_estimate = load8(&gaussians.brightness[first]) * share * exp8(hidden);
       for (const Lobe& lobe : tangent.lobes) {
         if (lobe.amplitude == 0) continue;
@@ -437,17 +471,19 @@ Rgbd InteractiveMicrocylinder::shade(const Mat3d& frame, const Vec3d& wo, std::s
         const Float8 imaginary = w_k * sin_k - w_l * sin_o;
         const Float8 length = sqrt8(real * real + imaginary * imaginary);
         const Float8 apart = (cos_k - cos_o) * (cos_k - cos_o) + (sin_k + sin_o) * (sin_k + sin_o);
-        const Float8 amplitude =
-            static_cast<float>(lobe.amplitude) * exp8(-2 * w_k * w_l * apart / (length + w_k + w_l));
+        const Float8 amplitude = static_cast<float>(lobe.amplitude) *
+                                 exp8(-2 * w_k * w_l * apart / (length + w_k + w_l));
         const Float8 cos_l = max8(real / length, splat8(1e-9F));
         const Float8 sin_l = imaginary / length;
         constexpr auto kWidest8 = static_cast<float>(kWidest);
         const Float8 theta_width = min8(1 / sqrt8(length), splat8(kWidest8));
         const Float8 phi_width = min8(1 / sqrt8(w_k * cos_l * cos_k), splat8(kWidest8));
         constexpr float kRootPi = 1.77245385F;
-        const Float8 mass = min8(kRootPi * theta_width, splat8(kPif)) * min8(kRootPi * phi_width, splat8(kPif));
+        const Float8 mass =
+            min8(kRootPi * theta_width, splat8(kPif)) * min8(kRootPi * phi_width, splat8(kPif));
         // cos^2 theta_i / cos^2 theta_d at the mean; cos^2 of a half is (1 + cos) / 2.
-        const Float8 cos_squared_d = max8(0.5F * (1 + cos_l * cos_o + sin_l * sin_o), splat8(1e-3F));
+        const Float8 cos_squared_d =
+            max8(0.5F * (1 + cos_l * cos_o + sin_l * sin_o), splat8(1e-3F));
         Float8 estimate = light_estimate * amplitude * mass * cos_l * cos_l / cos_squared_d;
         if (!lobe.surface) estimate *= albedo / (cos_l + cos_o);
         const auto put = [&](Terms::Quantity quantity, Float8 value) {
@@ -484,7 +520,8 @@ Rgbd InteractiveMicrocylinder::shade(const Mat3d& frame, const Vec3d& wo, std::s
       own.light[kept++] = own.light[k];
     }
     if (kept == 0) continue;
-    for (std::size_t k = kept; k % kFloat8Lanes != 0; ++k) {  // the last eight are filled with copies
+    // the last eight are filled with copies
+    for (std::size_t k = kept; k % kFloat8Lanes != 0; ++k) {
       for (std::vector<float>& value : own.values) value[k] = value[kept - 1];
     }
 
@@ -497,7 +534,9 @@ Rgbd InteractiveMicrocylinder::shade(const Mat3d& frame, const Vec3d& wo, std::s
     const float cos_o = std::cos(theta_o);
     const bool half_angle = fabric_.conventions.fresnel == ThreadConventions::Fresnel::kHalf;
     const float leaving =
-        half_angle ? 0 : 1 - static_cast<float>(fresnel_reflectance<1>(parameters.ior, Lanes<1>(o.z()))[0]);
+        half_angle
+            ? 0
+            : 1 - static_cast<float>(fresnel_reflectance<1>(parameters.ior, Lanes<1>(o.z()))[0]);
     const Mat3 to_patch = tangent.frame.cast<float>();
     const auto patch = [&](Float8 x, Float8 y, Float8 z) {
       return Vec8{to_patch(0, 0) * x + to_patch(0, 1) * y + to_patch(0, 2) * z,
@@ -526,11 +565,12 @@ Rgbd InteractiveMicrocylinder::shade(const Mat3d& frame, const Vec3d& wo, std::s
         const Float8 across = sqrt8(direction.x * direction.x + direction.y * direction.y);
         const Float8 scale = across > 1e-6F ? 1 / across : Float8{};
         distance = {atan2_8(direction.z, across),
-                    {-direction.z * direction.x * scale, -direction.z * direction.y * scale, across * across * scale}};
+                    {-direction.z * direction.x * scale, -direction.z * direction.y * scale,
+                     across * across * scale}};
       }
-      VisibilityLine8 line =
-          visibility_line(distance, cos_theta, patch(cos_theta, -sin_theta * sin_phi, -sin_theta * cos_phi),
-                          patch(Float8{}, cos_phi, -sin_phi));
+      VisibilityLine8 line = visibility_line(
+          distance, cos_theta, patch(cos_theta, -sin_theta * sin_phi, -sin_theta * cos_phi),
+          patch(Float8{}, cos_phi, -sin_phi));
       line.distance += line.theta_gradient * (theta.mean - atan2_8(sin_theta, cos_theta)) +
                        line.phi_gradient * (phi.mean - atan2_8(sin_phi, cos_phi));
       const Float8 integral = clipped_gaussians(theta, phi, line);
@@ -553,14 +593,17 @@ Rgbd InteractiveMicrocylinder::shade(const Mat3d& frame, const Vec3d& wo, std::s
       for (std::size_t a = 0; a < kSide; ++a) {
         const Float8 cosine = cosine8(theta_nodes.at[a]);
         const Float8 cos_theta_d = cosine8(0.5F * (theta_nodes.at[a] - theta_o));
-        Float8 along = theta_nodes.weight[a] * cosine * cosine / max8(cos_theta_d * cos_theta_d, splat8(1e-12F));
+        Float8 along = theta_nodes.weight[a] * cosine * cosine /
+                       max8(cos_theta_d * cos_theta_d, splat8(1e-12F));
         along = surface ? along : along / (cosine + cos_o);
         Float8 sum = {};
         for (std::size_t k = 0; k < kSide; ++k) {
-          const Float8 reflected = reflectance8(ior, max8(cos_theta_d * cos_half_phi_d[k], Float8{}));
-          const Float8 entering = half_angle
-                                      ? (1 - reflected) * (1 - reflected)
-                                      : leaving * (1 - reflectance8(ior, max8(cosine * cosine_phi[k], Float8{})));
+          const Float8 reflected =
+              reflectance8(ior, max8(cos_theta_d * cos_half_phi_d[k], Float8{}));
+          const Float8 entering =
+              half_angle
+                  ? (1 - reflected) * (1 - reflected)
+                  : leaving * (1 - reflectance8(ior, max8(cosine * cosine_phi[k], Float8{})));
           sum += phi_nodes.weight[k] * (surface ? reflected * cos_half_phi_d[k] : entering);
         }
         smooth += along * sum;
@@ -576,8 +619,8 @@ Rgbd InteractiveMicrocylinder::shade(const Mat3d& frame, const Vec3d& wo, std::s
   return radiance;
 }
 
-Rgbd ray_traced_radiance(const std::function<Rgbd(const Vec3d& wi, const Vec3d& wo)>& reflected, const Mat3d& frame,
-                         const Vec3d& wo, std::span<const Light> lights,
+Rgbd ray_traced_radiance(const std::function<Rgbd(const Vec3d& wi, const Vec3d& wo)>& reflected,
+                         const Mat3d& frame, const Vec3d& wo, std::span<const Light> lights,
                          const std::function<bool(const Vec3& direction)>& visible, int strata) {
   const Vec3d out = frame.transpose() * wo;
   Rgbd radiance = Rgbd::Zero();
@@ -600,12 +643,15 @@ Rgbd ray_traced_radiance(const std::function<Rgbd(const Vec3d& wi, const Vec3d& 
     for (int i = 0; i < strata; ++i) {
       // The distance within which the share (i + 1/2) / strata of the light lies.
       const double share = (i + 0.5) / strata;
-      const double depth = sharpness < 1e-6 ? 2 * share : -std::log1p(share * std::expm1(-2 * sharpness)) / sharpness;
+      const double depth = sharpness < 1e-6
+                               ? 2 * share
+                               : -std::log1p(share * std::expm1(-2 * sharpness)) / sharpness;
       const double cosine = 1 - depth;
       const double sine = std::sqrt(std::max(0.0, depth * (2 - depth)));
       for (int j = 0; j < strata; ++j) {
         const double azimuth = 2 * kPi * (j + 0.5 * (i % 2)) / strata;
-        sum += from(cosine * axis + sine * (std::cos(azimuth) * across + std::sin(azimuth) * other));
+        sum +=
+            from(cosine * axis + sine * (std::cos(azimuth) * across + std::sin(azimuth) * other));
       }
     }
     radiance += irradiance * sum / (static_cast<double>(strata) * strata);

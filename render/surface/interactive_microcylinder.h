@@ -1,19 +1,22 @@
 #ifndef HEDDLE_RENDER_SURFACE_INTERACTIVE_MICROCYLINDER_H_
 #define HEDDLE_RENDER_SURFACE_INTERACTIVE_MICROCYLINDER_H_
-// The microcylinder model under spherical Gaussian lights with shadows, fast enough to turn a camera: Iwasaki, Mizutani,
-// Dobashi and Nishita 2014, "Interactive cloth rendering of microcylinder appearance model under environment lighting".
+// The microcylinder model under spherical Gaussian lights with shadows, fast enough to turn a
+// camera: Iwasaki, Mizutani, Dobashi and Nishita 2014, "Interactive cloth rendering of
+// microcylinder appearance model under environment lighting".
 //
-// Radiance = sum over lights and tangents of (averaged weights) * (smooth factors) * (two circular Gaussians clipped by the
-// border of what is visible): the light's Gaussian is one in theta and one in phi of the thread (eq. 11), a lobe of the
-// thread is one in theta, and their product is integrated on the visible side of a line (clipped_gaussians). Weights come
-// from a WeightingTable, the line from DistanceMaps; neither knows the threads' colours, indices and widths, so those can be
-// edited at once.
+// Radiance = sum over lights and tangents of (averaged weights) * (smooth factors) * (two circular
+// Gaussians clipped by the border of what is visible): the light's Gaussian is one in theta and one
+// in phi of the thread (eq. 11), a lobe of the thread is one in theta, and their product is
+// integrated on the visible side of a line (clipped_gaussians). Weights come from a WeightingTable,
+// the line from DistanceMaps; neither knows the threads' colours, indices and widths, so those can
+// be edited at once.
 //
-// `printed` computes everything as in the paper: smooth factors at the means (theta_l, phi_k), weights averaged over the light
-// (eq. 9), eq. 13 times the logistic function of eq. 14. Otherwise smooth factors are averaged over the Gaussians, weights are
-// those around the product of light and lobe, the clipped integral is exact, and a tangent that stands for a piece of a curve
-// has its lobes widened by that piece. Errors of both: docs/surface-models.md.
-// Shading is thread-safe. Tested in tests/render/surface/interactive_microcylinder_test.cpp.
+// `printed` computes everything as in the paper: smooth factors at the means (theta_l, phi_k),
+// weights averaged over the light (eq. 9), eq. 13 times the logistic function of eq. 14. Otherwise
+// smooth factors are averaged over the Gaussians, weights are those around the product of light and
+// lobe, the clipped integral is exact, and a tangent that stands for a piece of a curve has its
+// lobes widened by that piece. Errors of both: docs/surface-models.md. Shading is thread-safe.
+// Tested in tests/render/surface/interactive_microcylinder_test.cpp.
 
 #include <array>
 #include <functional>
@@ -52,16 +55,17 @@ class InteractiveMicrocylinder {
   /// Changes a thread's scattering. Tangents stay where they are.
   void set_scattering(std::size_t thread, const ThreadParameters& parameters);
 
-  /// Radiance towards wo (world, unit) of a point whose frame is world = frame * patch; lights in world space. Directional
-  /// lights are visible or not. Eight terms at a time in single precision, without those that hold 1e-3 of the light together;
-  /// `printed` as shade_in_double().
+  /// Radiance towards wo (world, unit) of a point whose frame is world = frame * patch; lights in
+  /// world space. Directional lights are visible or not. Eight terms at a time in single precision,
+  /// without those that hold 1e-3 of the light together; `printed` as shade_in_double().
   Rgbd shade(const Mat3d& frame, const Vec3d& wo, std::span<const Light> lights,
              const PointVisibility& visibility) const;
   /// The same, all terms one after another in double.
   Rgbd shade_in_double(const Mat3d& frame, const Vec3d& wo, std::span<const Light> lights,
                        const PointVisibility& visibility) const;
 
-  /// What shade() approximates, for one direction: R of microcylinder.h for these tangents and weights, patch frame.
+  /// What shade() approximates, for one direction: R of microcylinder.h for these tangents and
+  /// weights, patch frame.
   Rgbd reflected(const Vec3d& wi, const Vec3d& wo) const;
 
   const std::vector<TangentSample>& tangents() const { return samples_; }
@@ -86,10 +90,10 @@ class InteractiveMicrocylinder {
   std::unique_ptr<const SigmoidGains> gains_;  // printed only
 };
 
-/// The truth for shade(): every Gaussian light integrated by strata * strata directions of equal shares of it, each with its
-/// own ray. `reflected` in the patch frame, `visible` in world space.
-Rgbd ray_traced_radiance(const std::function<Rgbd(const Vec3d& wi, const Vec3d& wo)>& reflected, const Mat3d& frame,
-                         const Vec3d& wo, std::span<const Light> lights,
+/// The truth for shade(): every Gaussian light integrated by strata * strata directions of equal
+/// shares of it, each with its own ray. `reflected` in the patch frame, `visible` in world space.
+Rgbd ray_traced_radiance(const std::function<Rgbd(const Vec3d& wi, const Vec3d& wo)>& reflected,
+                         const Mat3d& frame, const Vec3d& wo, std::span<const Light> lights,
                          const std::function<bool(const Vec3& direction)>& visible, int strata);
 
 }  // namespace heddle

@@ -16,11 +16,13 @@ namespace {
 constexpr int kLanes = 8;  // tangents computed at once
 using Tangents = Lanes<kLanes>;
 
-// Panels of a ramp: eight Gauss-Legendre points on a panel of three deviations of a Gaussian leave 4e-9 of its peak.
+// Panels of a ramp: eight Gauss-Legendre points on a panel of three deviations of a Gaussian leave
+// 4e-9 of its peak.
 constexpr double kPanelDeviations = 3;
 constexpr double kWidestPanel = 0.35;  // radians; for everything else that varies
 
-/// A direction in the frame of a thread that lies in the cloth: x along it, y across, z the cloth's normal.
+/// A direction in the frame of a thread that lies in the cloth: x along it, y across, z the cloth's
+/// normal.
 struct LocalDirection {
   LocalDirection(int direction, const Vec3d& w)
       : along(direction == 1 ? w.x() : w.y()),
@@ -36,10 +38,13 @@ struct LocalDirection {
 
   double along, across, up;
   double length;  // of the projection on the plane of tangent and normal
-  double psi;     // angle from the normal in that plane, of a thread that lies flat; tilting the tangent by a adds a
+  // angle from the normal in that plane, of a thread that lies flat; tilting the tangent by a adds
+  // a
+  double psi;
 };
 
-/// eq. 9 and 13: a product where two cosines are independent, the lesser one where both directions are close.
+/// eq. 9 and 13: a product where two cosines are independent, the lesser one where both directions
+/// are close.
 template <typename Blend>
 Tangents blended(const Blend& u, const Tangents& a, const Tangents& b) {
   return (1 - u) * a * b + u * a.min(b);
@@ -63,10 +68,11 @@ class Panels {
     ends_[count_++] = at;
   }
 
-  /// Ends about `centre` at distances reach, reach / 3, ... down to scale: what varies over a distance that shrinks
-  /// towards a point close to the integration path.
+  /// Ends about `centre` at distances reach, reach / 3, ... down to scale: what varies over a
+  /// distance that shrinks towards a point close to the integration path.
   void add_graded(double centre, double scale, double reach) {
-    for (double distance = reach; distance > scale; distance /= 3) add(centre - distance), add(centre + distance);
+    for (double distance = reach; distance > scale; distance /= 3)
+      add(centre - distance), add(centre + distance);
   }
 
   template <typename Function>
@@ -135,7 +141,8 @@ std::vector<Batch> batches_of(const std::vector<TangentPiece>& atoms) {
 
 }  // namespace
 
-Microcylinder::Thread::Thread(const MicrocylinderThread& thread, const ThreadConventions& conventions)
+Microcylinder::Thread::Thread(const MicrocylinderThread& thread,
+                              const ThreadConventions& conventions)
     : direction(thread.direction),
       share(thread.share),
       scattering(thread.scattering, conventions),
@@ -146,8 +153,8 @@ Microcylinder::Thread::Thread(const MicrocylinderThread& thread, const ThreadCon
   }
   atoms = batches_of<Batch>(flat);
 
-  // A tangent turned by d turns the mirror cone by 2 d; lobes 1.5 deviations apart add up to a smooth one. At most about
-  // 32 of them: very narrow lobes are widened.
+  // A tangent turned by d turns the mirror cone by 2 d; lobes 1.5 deviations apart add up to a
+  // smooth one. At most about 32 of them: very narrow lobes are widened.
   double range = 0;
   for (const TangentPiece& ramp : ramps) range += ramp.end - ramp.begin;
   const double step = std::max(1.5 * scattering.surface_deviation(), range / 24);
@@ -168,13 +175,15 @@ Microcylinder::Thread::Thread(const MicrocylinderThread& thread, const ThreadCon
 CurveMeans Microcylinder::Thread::means(const Vec3d& wi, const Vec3d& wo, int refinements) const {
   const LocalDirection in(direction, wi);
   const LocalDirection out(direction, wo);
-  const double psi_d = in.psi - out.psi;  // both within 90 degrees of the normal, so wrapped already
+  // both within 90 degrees of the normal, so wrapped already
+  const double psi_d = in.psi - out.psi;
   const double u_psi = std::exp(blend_exponent * psi_d * psi_d);
   CurveMeans sum;
   const auto add = [&](const Tangents& sine, const Tangents& cosine, const Tangents& weight) {
     ThreadDirection<kLanes> i = in.at(sine, cosine);
     ThreadDirection<kLanes> r = out.at(sine, cosine);
-    // M = P = 0 where either looks at the back of the local surface. Clamped there, so that 0 is not multiplied by infinity.
+    // M = P = 0 where either looks at the back of the local surface. Clamped there, so that 0 is
+    // not multiplied by infinity.
     const auto facing = i.normal > 0 && r.normal > 0;
     Tangents w = facing.select(weight, 0.0);
     i.normal = i.normal.max(1e-60);
@@ -200,7 +209,8 @@ CurveMeans Microcylinder::Thread::means(const Vec3d& wi, const Vec3d& wo, int re
                              std::abs(out.across) * in.along - std::abs(in.across) * out.along);
   if (m_kink <= lowest) m_kink += kPi;
   if (m_kink >= highest) m_kink -= kPi;
-  // theta_h = 0, the middle of both Gaussians; theta_h changes at most as fast as the tangent's angle.
+  // theta_h = 0, the middle of both Gaussians; theta_h changes at most as fast as the tangent's
+  // angle.
   const double specular = -std::atan2(in.along + out.along, in.up + out.up);
 
   static const QuadratureRule& rule = gauss_legendre(kLanes);
@@ -220,12 +230,14 @@ CurveMeans Microcylinder::Thread::means(const Vec3d& wi, const Vec3d& wo, int re
         panels.add(specular + width * kPanelDeviations * deviation);
       }
     }
-    // phi turns from one side to the other where a tangent passes a direction at the distance asin |across|.
+    // phi turns from one side to the other where a tangent passes a direction at the distance asin
+    // |across|.
     for (const LocalDirection& w : {in, out}) {
       const double distance = std::abs(w.across) / w.length;
       const double floor = 1e-3 * (highest - lowest);
       for (const double grazing : {-kPi / 2 - w.psi, kPi / 2 - w.psi}) {
-        if (distance < kWidestPanel && distance > 0) panels.add_graded(grazing, std::max(distance, floor), 1.0);
+        if (distance < kWidestPanel && distance > 0)
+          panels.add_graded(grazing, std::max(distance, floor), 1.0);
       }
     }
     const double density = ramp.share / (ramp.end - ramp.begin);
@@ -242,36 +254,40 @@ CurveMeans Microcylinder::Thread::means(const Vec3d& wi, const Vec3d& wo, int re
         const Tangents cosine = (1 - tau.square()) * scale;
         const double middle_sine = std::sin(middle);
         const double middle_cosine = std::cos(middle);
-        add(middle_sine * cosine + middle_cosine * sine, middle_cosine * cosine - middle_sine * sine,
-            (2 * reach * density) * weights * scale);
+        add(middle_sine * cosine + middle_cosine * sine,
+            middle_cosine * cosine - middle_sine * sine, (2 * reach * density) * weights * scale);
       }
     });
   }
   return sum;
 }
 
-/// min(1, (n . wi) / E(wi)) with E = integral over wo of R(wi, wo) (n . wo), the largest channel: directional albedo times
-/// n . wi, which stays finite towards the horizon. Bilinear in a table over elevation and azimuth. Near the horizon E
-/// changes within a few degrees of a thread's direction, where columns are close; on that direction itself it has a
-/// narrow minimum, which no column may meet.
+/// min(1, (n . wi) / E(wi)) with E = integral over wo of R(wi, wo) (n . wo), the largest channel:
+/// directional albedo times n . wi, which stays finite towards the horizon. Bilinear in a table
+/// over elevation and azimuth. Near the horizon E changes within a few degrees of a thread's
+/// direction, where columns are close; on that direction itself it has a narrow minimum, which no
+/// column may meet.
 class Microcylinder::EnergyTable {
  public:
   explicit EnergyTable(const Microcylinder& fabric) : table_(kRows * kColumns) {
     tbb::parallel_for(0, kRows * kColumns, [&](int k) {
-      const double elevation = std::max(1e-7, kPi / 2 * std::pow(static_cast<double>(k / kColumns) / (kRows - 1), 3));
+      const double elevation =
+          std::max(1e-7, kPi / 2 * std::pow(static_cast<double>(k / kColumns) / (kRows - 1), 3));
       const double azimuth = azimuth_of(k % kColumns);
       const double level = std::cos(elevation);
       const Vec3d wi(level * std::cos(azimuth), level * std::sin(azimuth), std::sin(elevation));
       table_[static_cast<std::size_t>(k)] = fabric.directional_albedo(wi).maxCoeff() * wi.z();
     });
-    // Within a degree of the horizon E is too rough to interpolate: the largest of each node and its neighbours.
+    // Within a degree of the horizon E is too rough to interpolate: the largest of each node and
+    // its neighbours.
     const std::vector<double> rough = table_;
     for (int row = 0; row < kRoughRows; ++row) {
       for (int column = 0; column < kColumns; ++column) {
         double most = 0;
         for (int r = std::max(0, row - 1); r <= row + 1; ++r) {
           for (int c = column - 1; c <= column + 1; ++c) {
-            most = std::max(most, rough[static_cast<std::size_t>(r * kColumns + (c + kColumns) % kColumns)]);
+            most = std::max(
+                most, rough[static_cast<std::size_t>(r * kColumns + (c + kColumns) % kColumns)]);
           }
         }
         table_[static_cast<std::size_t>(row * kColumns + column)] = most;
@@ -297,10 +313,11 @@ class Microcylinder::EnergyTable {
   static constexpr int kRows = 20;
   static constexpr int kRoughRows = 5;
   static constexpr int kColumns = 56;
-  static constexpr double kMargin = 0.95;  // what bilinear interpolation falls short by, and the cubature
+  // what bilinear interpolation falls short by, and the cubature
+  static constexpr double kMargin = 0.95;
 
-  // Both coordinates are cubic: about the horizon, and about the four directions along threads with seven columns to either
-  // side.
+  // Both coordinates are cubic: about the horizon, and about the four directions along threads with
+  // seven columns to either side.
   static constexpr int kOctant = kColumns / 8;
   static double azimuth_of(int column) {
     const int axis = (column + kOctant) / (2 * kOctant);
@@ -344,7 +361,8 @@ double Microcylinder::energy_scale(const Vec3d& wi) const {
   return energy_table_ && wi.z() > 0 ? (*energy_table_)(wi) : 1;
 }
 
-Rgbd Microcylinder::reflected(const SurfacePoint& /*point*/, const Vec3d& wi, const Vec3d& wo) const {
+Rgbd Microcylinder::reflected(const SurfacePoint& /*point*/, const Vec3d& wi,
+                              const Vec3d& wo) const {
   return published(wi, wo) * energy_scale(wi);
 }
 
@@ -353,18 +371,20 @@ Rgbd Microcylinder::directional_albedo(const Vec3d& wi) const {
   settings.tolerance = 2e-3;
   settings.columns = 4;
   settings.rows = 8;
-  const Rgbd flux = integrate_rectangle(0, kPi / 2, 0, 2 * kPi, settings, [&](double polar, double azimuth) {
-    const double sine = std::sin(polar);
-    const Vec3d wo(sine * std::cos(azimuth), sine * std::sin(azimuth), std::cos(polar));
-    return Rgbd(reflected({}, wi, wo) * (sine * std::cos(polar)));
-  });
+  const Rgbd flux =
+      integrate_rectangle(0, kPi / 2, 0, 2 * kPi, settings, [&](double polar, double azimuth) {
+        const double sine = std::sin(polar);
+        const Vec3d wo(sine * std::cos(azimuth), sine * std::sin(azimuth), std::cos(polar));
+        return Rgbd(reflected({}, wi, wo) * (sine * std::cos(polar)));
+      });
   return flux / wi.z();
 }
 
 Rgbd Microcylinder::reflected_sg(const SurfacePoint& point, const Vec3d& axis, double sharpness,
                                  const Vec3d& wo) const {
-  // Polar coordinates about the axis: s^2 is the light's share nearer to the axis, and at each distance only the arc above the
-  // horizon is covered. Frame: `up` is the direction across the axis that climbs most.
+  // Polar coordinates about the axis: s^2 is the light's share nearer to the axis, and at each
+  // distance only the arc above the horizon is covered. Frame: `up` is the direction across the
+  // axis that climbs most.
   const double sine = std::hypot(axis.x(), axis.y());
   const double elevation = std::atan2(axis.z(), sine);
   const Vec3d up = sine > 1e-12 ? Vec3d((Vec3d(0, 0, 1) - axis.z() * axis) / sine) : Vec3d(1, 0, 0);
@@ -386,25 +406,30 @@ Rgbd Microcylinder::reflected_sg(const SurfacePoint& point, const Vec3d& axis, d
   settings.rows = 2 * settings.columns;
   const auto integrate_between = [&](double from, double to) {
     if (!(share_of(to) > share_of(from))) return Rgbd(Rgbd::Zero());
-    return integrate_rectangle(share_of(from), share_of(to), -1, 1, settings, [&](double s, double v) -> Rgbd {
-      const double depth = depth_of(s);
-      const double cosine = 1 - depth;
-      const double radius = std::sqrt(depth * (2 - depth));
-      // Half of the arc above the horizon.
-      const double level = -axis.z() * cosine / std::max(sine * radius, 1e-300);
-      const double arc = level <= -1 ? kPi : level >= 1 ? 0 : std::acos(level);
-      if (arc == 0) return Rgbd::Zero();
-      const Vec3d wi = cosine * axis + radius * (std::cos(arc * v) * up + std::sin(arc * v) * side);
-      return reflected(point, wi, wo) * (s * arc / kPi);
-    });
+    return integrate_rectangle(
+        share_of(from), share_of(to), -1, 1, settings, [&](double s, double v) -> Rgbd {
+          const double depth = depth_of(s);
+          const double cosine = 1 - depth;
+          const double radius = std::sqrt(depth * (2 - depth));
+          // Half of the arc above the horizon.
+          const double level = -axis.z() * cosine / std::max(sine * radius, 1e-300);
+          const double arc = level <= -1 ? kPi : level >= 1 ? 0 : std::acos(level);
+          if (arc == 0) return Rgbd::Zero();
+          const Vec3d wi =
+              cosine * axis + radius * (std::cos(arc * v) * up + std::sin(arc * v) * side);
+          return reflected(point, wi, wo) * (s * arc / kPi);
+        });
   };
-  // The arc begins to be cut, or to exist, where the horizon is nearest, and is whole again, or gone, where it is farthest.
+  // The arc begins to be cut, or to exist, where the horizon is nearest, and is whole again, or
+  // gone, where it is farthest.
   const double nearest = std::abs(elevation);
   return integrate_between(elevation > 0 ? 0 : nearest, elevation > 0 ? nearest : kPi - nearest) +
-         integrate_between(elevation > 0 ? nearest : kPi - nearest, elevation > 0 ? kPi - nearest : kPi);
+         integrate_between(elevation > 0 ? nearest : kPi - nearest,
+                           elevation > 0 ? kPi - nearest : kPi);
 }
 
-/// The lobes of a batch of tangents for one wo: a Gaussian in theta_i about the mirror cone -theta_o, cos phi_i / 2 in phi_i.
+/// The lobes of a batch of tangents for one wo: a Gaussian in theta_i about the mirror cone
+/// -theta_o, cos phi_i / 2 in phi_i.
 struct Microcylinder::Lobes {
   Lobes(const Thread& thread, const Thread::Batch& batch, const LocalDirection& wo) {
     const ThreadDirection<kLanes> out = wo.at(batch.sine, batch.cosine);
@@ -413,14 +438,19 @@ struct Microcylinder::Lobes {
     const Tangents cos_theta = (normal.square() + out.binormal.square()).sqrt().max(1e-6);
     const Tangents cos_phi = normal / cos_theta;
     theta_o = inclination(out.tangent, cos_theta);
-    // What each sends to wo, roughly: only noise depends on it. The square root of what is seen of a tangent, because 1/Q
-    // makes up for it under light that few tangents meet.
+    // What each sends to wo, roughly: only noise depends on it. The square root of what is seen of
+    // a tangent, because 1/Q makes up for it under light that few tangents meet.
     const Tangents seen = thread.share * batch.weight * (normal / wo.length).sqrt() * cos_phi;
-    const Tangents reflected = fresnel_reflectance<kLanes>(parameters.ior, cos_theta * (0.5 * (1 + cos_phi)).sqrt());
-    const Tangents inside = seen * (1 - reflected).square() * (parameters.albedo.maxCoeff() / (0.5 + 0.5 * cos_theta));
-    // The highest direction of the mirror cone, theta_i = -theta_o, stands this far above the horizon.
+    const Tangents reflected =
+        fresnel_reflectance<kLanes>(parameters.ior, cos_theta * (0.5 * (1 + cos_phi)).sqrt());
+    const Tangents inside =
+        seen * (1 - reflected).square() * (parameters.albedo.maxCoeff() / (0.5 + 0.5 * cos_theta));
+    // The highest direction of the mirror cone, theta_i = -theta_o, stands this far above the
+    // horizon.
     const Tangents height = kPi / 2 - (theta_o + batch.angle).abs();
-    const auto above = [&](double deviation) -> Tangents { return 1 / (1 + (-1.7 / deviation * height).exp()); };
+    const auto above = [&](double deviation) -> Tangents {
+      return 1 / (1 + (-1.7 / deviation * height).exp());
+    };
     surface = 2 * seen * reflected;
     volume = (1 - parameters.kd) * inside;
     broad = parameters.kd * inside.sum() + 0.2 * (surface.sum() + volume.sum());
@@ -439,9 +469,11 @@ struct Microcylinder::Lobes {
     const Tangents cos_theta_squared = (in.normal.square() + in.binormal.square()).max(1e-12);
     const Tangents from_cone = inclination(in.tangent, cos_theta_squared.sqrt()) + theta_o;
     const auto gaussian = [&](double deviation) -> Tangents {
-      return (-0.5 / (deviation * deviation) * from_cone.square()).exp() / (std::sqrt(2 * kPi) * deviation);
+      return (-0.5 / (deviation * deviation) * from_cone.square()).exp() /
+             (std::sqrt(2 * kPi) * deviation);
     };
-    const Tangents along = surface * gaussian(thread.surface_lobe) + volume * gaussian(thread.volume_lobe);
+    const Tangents along =
+        surface * gaussian(thread.surface_lobe) + volume * gaussian(thread.volume_lobe);
     return (along * in.normal.max(0.0) * 0.5 / cos_theta_squared).sum();
   }
 
@@ -493,10 +525,12 @@ std::optional<SurfaceSample> Microcylinder::sample(const SurfacePoint& point, co
   }
   if (total + uniform == 0) uniform = 1;
   double left = choice * (total + uniform) - uniform;
-  Vec3d wi(std::sqrt(1 - a * a) * std::cos(2 * kPi * b), std::sqrt(1 - a * a) * std::sin(2 * kPi * b), a);
-  const auto draw = [&](const Thread& thread, const Thread::Batch& batch, const Lobes& lobes, Eigen::Index k,
-                        double deviation) {
-    const double theta = deviation * std::sqrt(-2 * std::log1p(-a)) * std::cos(2 * kPi * b) - lobes.theta_o[k];
+  Vec3d wi(std::sqrt(1 - a * a) * std::cos(2 * kPi * b),
+           std::sqrt(1 - a * a) * std::sin(2 * kPi * b), a);
+  const auto draw = [&](const Thread& thread, const Thread::Batch& batch, const Lobes& lobes,
+                        Eigen::Index k, double deviation) {
+    const double theta =
+        deviation * std::sqrt(-2 * std::log1p(-a)) * std::cos(2 * kPi * b) - lobes.theta_o[k];
     const double sin_phi = 2 * c - 1;
     const double normal = std::cos(theta) * std::sqrt(1 - sin_phi * sin_phi);
     const double along = std::sin(theta) * batch.cosine[k] - normal * batch.sine[k];
@@ -518,7 +552,8 @@ std::optional<SurfaceSample> Microcylinder::sample(const SurfacePoint& point, co
       }
       for (Eigen::Index k = 0; k < kLanes && left >= 0; ++k) {
         if (lobes.surface[k] + lobes.volume[k] == 0) continue;
-        wi = draw(thread, batch, lobes, k, left < lobes.surface[k] ? thread.surface_lobe : thread.volume_lobe);
+        wi = draw(thread, batch, lobes, k,
+                  left < lobes.surface[k] ? thread.surface_lobe : thread.volume_lobe);
         left -= lobes.surface[k] + lobes.volume[k];
       }
     }
@@ -557,14 +592,17 @@ MicrocylinderFabric read_microcylinder_fabric(const TomlTable& document) {
     for (double& offset : thread.offsets) offset = radians(offset);
     thread.lengths = table.numbers("lengths", {0, 1e6}, 1, kMostOffsets - 1);
     if (thread.lengths.size() + 1 != thread.offsets.size()) {
-      table.fail("lengths", fmt::format("expected {} lengths between {} offsets, found {}", thread.offsets.size() - 1,
-                                        thread.offsets.size(), thread.lengths.size()));
+      table.fail("lengths", fmt::format("expected {} lengths between {} offsets, found {}",
+                                        thread.offsets.size() - 1, thread.offsets.size(),
+                                        thread.lengths.size()));
     }
-    if (std::all_of(thread.lengths.begin(), thread.lengths.end(), [](double length) { return length == 0; })) {
+    if (std::all_of(thread.lengths.begin(), thread.lengths.end(),
+                    [](double length) { return length == 0; })) {
       table.fail("lengths", "expected a length above 0");
     }
     covered += thread.share;
-    if (covered > 1 + 1e-9) table.fail("share", fmt::format("the shares of all threads sum to {}: at most 1", covered));
+    if (covered > 1 + 1e-9)
+      table.fail("share", fmt::format("the shares of all threads sum to {}: at most 1", covered));
     fabric.threads.push_back(thread);
   }
   if (fabric.threads.empty() || fabric.threads.size() > kMostThreads) {

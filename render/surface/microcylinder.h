@@ -1,18 +1,22 @@
 #ifndef HEDDLE_RENDER_SURFACE_MICROCYLINDER_H_
 #define HEDDLE_RENDER_SURFACE_MICROCYLINDER_H_
-// Cloth as threads in two directions: Sadeghi et al. 2013, "A practical microcylinder appearance model for cloth rendering",
-// section 5, for one directional light:
-//   R(wi, wo) = BRDF * (n . wi) = 1/Q sum_j a_j <f_s M P cos theta_i>_j,   Q = sum_j a_j <P>_j + (1 - sum_j a_j) (wo . n)
-// with < >_j the mean over the tangent curve of thread j, M (eq. 7-9) shadowing and masking, P (eq. 11-13) the projected
-// lengths. Q depends on wi, so 1/Q stands inside the integral over light (eq. 14 prints it outside). R = 0 where Q = 0;
-// tangents with M P = 0 are left out before the division by cos^2 theta_d.
+// Cloth as threads in two directions: Sadeghi et al. 2013, "A practical microcylinder appearance
+// model for cloth rendering", section 5, for one directional light:
+//   R(wi, wo) = BRDF * (n . wi) = 1/Q sum_j a_j <f_s M P cos theta_i>_j,   Q = sum_j a_j <P>_j + (1
+//     - sum_j a_j) (wo . n)
+// with < >_j the mean over the tangent curve of thread j, M (eq. 7-9) shadowing and masking, P (eq.
+// 11-13) the projected lengths. Q depends on wi, so 1/Q stands inside the integral over light (eq.
+// 14 prints it outside). R = 0 where Q = 0; tangents with M P = 0 are left out before the division
+// by cos^2 theta_d.
 //
-// Means over tangent curves are integrals over the tangent's angle (tangent_curve.h), in panels that end where M or P change
-// form and that resolve the lobes: relative error below 1e-6 against 16 times as many panels, 1e-5 beyond 89 degrees. A few
-// equally spaced samples instead show highlights that are not there. Everything is double; eval asks the same functions.
+// Means over tangent curves are integrals over the tangent's angle (tangent_curve.h), in panels
+// that end where M or P change form and that resolve the lobes: relative error below 1e-6 against
+// 16 times as many panels, 1e-5 beyond 89 degrees. A few equally spaced samples instead show
+// highlights that are not there. Everything is double; eval asks the same functions.
 //
-// The published model is neither reciprocal nor energy conserving, and unbounded for opposite grazing directions: figures in
-// docs/surface-models.md. Tested in tests/render/surface/microcylinder_test.cpp.
+// The published model is neither reciprocal nor energy conserving, and unbounded for opposite
+// grazing directions: figures in docs/surface-models.md. Tested in
+// tests/render/surface/microcylinder_test.cpp.
 
 #include <memory>
 #include <vector>
@@ -26,18 +30,21 @@ namespace heddle {
 struct MicrocylinderThread {
   int direction = 1;  // 1: along x, 2: along y
   ThreadParameters scattering;
-  double share = 0.5;                    // a: of the patch's area
-  std::vector<double> offsets = {0, 0};  // [n] tangent curve: angle from the cloth, radians, rising along the direction
-  std::vector<double> lengths = {1};     // [n - 1] arc lengths in between, any unit
+  double share = 0.5;  // a: of the patch's area
+  // [n] tangent curve: angle from the cloth, radians, rising along the direction
+  std::vector<double> offsets = {0, 0};
+  std::vector<double> lengths = {1};  // [n - 1] arc lengths in between, any unit
 };
 
 struct MicrocylinderFabric {
   ThreadConventions conventions;
-  bool energy_safe = false;  // R scaled, by a factor for each wi, so that no more light leaves than arrives
+  // R scaled, by a factor for each wi, so that no more light leaves than arrives
+  bool energy_safe = false;
   std::vector<MicrocylinderThread> threads;
 };
 
-/// Reads the keys of configs/README.md, "Microcylinder"; does not call finish(). Errors: ConfigError with its place.
+/// Reads the keys of configs/README.md, "Microcylinder"; does not call finish(). Errors:
+/// ConfigError with its place.
 MicrocylinderFabric read_microcylinder_fabric(const TomlTable& document);
 
 class Microcylinder final : public SurfaceModel {
@@ -48,19 +55,23 @@ class Microcylinder final : public SurfaceModel {
   Rgbd reflected(const SurfacePoint& point, const Vec3d& wi, const Vec3d& wo) const override;
 
   /// Adaptive cubature over the light, to 2e-3 of the largest channel; 1 to 20 ms.
-  Rgbd reflected_sg(const SurfacePoint& point, const Vec3d& axis, double sharpness, const Vec3d& wo) const override;
+  Rgbd reflected_sg(const SurfacePoint& point, const Vec3d& axis, double sharpness,
+                    const Vec3d& wo) const override;
 
-  /// A mixture of lobes about the mirror cones of tangents of the curves, chosen by what each shows to wo, and of uniform
-  /// directions over the hemisphere.
-  std::optional<SurfaceSample> sample(const SurfacePoint& point, const Vec3& wo, RandomStream& random) const override;
+  /// A mixture of lobes about the mirror cones of tangents of the curves, chosen by what each shows
+  /// to wo, and of uniform directions over the hemisphere.
+  std::optional<SurfaceSample> sample(const SurfacePoint& point, const Vec3& wo,
+                                      RandomStream& random) const override;
   float pdf(const SurfacePoint& point, const Vec3& wi, const Vec3& wo) const override;
 
-  /// R = published() * energy_scale(); reflected() without refinements. Every refinement halves all panels: two leave 1e-12.
+  /// R = published() * energy_scale(); reflected() without refinements. Every refinement halves all
+  /// panels: two leave 1e-12.
   Rgbd published(const Vec3d& wi, const Vec3d& wo, int refinements = 0) const;
   /// 1 unless the fabric is energy safe.
   double energy_scale(const Vec3d& wi) const;
 
-  /// Share of the light from wi that is reflected: the integral over wo of R(wi, wo) (n . wo), divided by n . wi. To 0.2 %.
+  /// Share of the light from wi that is reflected: the integral over wo of R(wi, wo) (n . wo),
+  /// divided by n . wi. To 0.2 %.
   Rgbd directional_albedo(const Vec3d& wi) const;
 
  private:

@@ -6,7 +6,8 @@
 
 namespace heddle {
 
-Rgbd integrate_sg_light(const Vec3d& axis, double sharpness, const std::function<Rgbd(const Vec3d&)>& reflected,
+Rgbd integrate_sg_light(const Vec3d& axis, double sharpness,
+                        const std::function<Rgbd(const Vec3d&)>& reflected,
                         const SgLightQuadrature& settings) {
   const Vec3d side = axis.unitOrthogonal();
   const Vec3d other = axis.cross(side);
@@ -23,7 +24,8 @@ Rgbd integrate_sg_light(const Vec3d& axis, double sharpness, const std::function
       const auto step = static_cast<std::int64_t>(i) * generator % count;
       const double azimuth = 2.0 * kPi * static_cast<double>(step) / count;
       const double sine = std::sqrt(d * (2.0 - d));
-      const Vec3d wi = (1.0 - d) * axis + sine * (std::cos(azimuth) * side + std::sin(azimuth) * other);
+      const Vec3d wi =
+          (1.0 - d) * axis + sine * (std::cos(azimuth) * side + std::sin(azimuth) * other);
       if (wi.z() > 0.0) sum += reflected(wi);
     }
     return Rgbd(sum / count);

@@ -2,11 +2,12 @@
 #define HEDDLE_RENDER_SURFACE_SG_LIGHT_QUADRATURE_H_
 // A surface model under a spherical Gaussian light by quadrature, for models without a closed form.
 //
-// Fibonacci lattices in (share of the light's power within an angle of its axis, azimuth): there the light is constant, for
-// every sharpness from 0 (the whole sphere) up. Each next lattice has 2.6 times as many points, until two agree. Errors fall
-// as 1 / N for continuous models and as N^(-3/4) for those with steps (point values of woven cloth). Adaptive cells were
-// tried: they miss steps that touch a cell between its nodes, and at equal cost their errors were larger.
-// Tested in tests/render/surface/sg_light_quadrature_test.cpp.
+// Fibonacci lattices in (share of the light's power within an angle of its axis, azimuth): there
+// the light is constant, for every sharpness from 0 (the whole sphere) up. Each next lattice
+// has 2.6 times as many points, until two agree. Errors fall as 1 / N for continuous models and as
+// N^(-3/4) for those with steps (point values of woven cloth). Adaptive cells were tried: they miss
+// steps that touch a cell between its nodes, and at equal cost their errors were larger. Tested in
+// tests/render/surface/sg_light_quadrature_test.cpp.
 
 #include <functional>
 
@@ -19,8 +20,10 @@ struct SgLightQuadrature {
   int max_points = 50000;   // of the finest lattice, at least 1597; the coarsest has 610
 };
 
-/// Integral over the sphere of reflected(wi) G(wi; axis, sharpness) / M(sharpness), 0 where wi.z <= 0.
-Rgbd integrate_sg_light(const Vec3d& axis, double sharpness, const std::function<Rgbd(const Vec3d&)>& reflected,
+/// Integral over the sphere of reflected(wi) G(wi; axis, sharpness) / M(sharpness), 0 where wi.z <=
+/// 0.
+Rgbd integrate_sg_light(const Vec3d& axis, double sharpness,
+                        const std::function<Rgbd(const Vec3d&)>& reflected,
                         const SgLightQuadrature& settings = {});
 
 }  // namespace heddle

@@ -16,10 +16,18 @@ namespace heddle {
 std::unique_ptr<const SurfaceModel> read_surface_model(const TomlTable& document) {
   using Read = std::function<std::unique_ptr<const SurfaceModel>(const TomlTable&)>;
   static const std::map<std::string, Read> readers = {
-      {"irawan-2012", [](const TomlTable& config) { return std::make_unique<WovenYarns>(read_woven_yarns(config)); }},
+      {"irawan-2012",
+       [](const TomlTable& config) {
+         return std::make_unique<WovenYarns>(read_woven_yarns(config));
+       }},
       {"microcylinder",
-       [](const TomlTable& config) { return std::make_unique<Microcylinder>(read_microcylinder_fabric(config)); }},
-      {"woven-cotton", [](const TomlTable& config) { return std::make_unique<WovenCotton>(read_woven_cotton(config)); }},
+       [](const TomlTable& config) {
+         return std::make_unique<Microcylinder>(read_microcylinder_fabric(config));
+       }},
+      {"woven-cotton",
+       [](const TomlTable& config) {
+         return std::make_unique<WovenCotton>(read_woven_cotton(config));
+       }},
   };
   const std::string model = document.string("model");
   const auto reader = readers.find(model);

@@ -19,8 +19,8 @@ TomlTable surface_preset(std::string_view name) {
   for (const BuiltInConfig& config : built_in_surface_configs()) {
     if (config.name == name) return TomlTable::parse(config.text, fmt::format("{}.toml", name));
   }
-  throw ConfigError(
-      fmt::format("no surface fabric called {}; known: {}", name, fmt::join(surface_preset_names(), ", ")));
+  throw ConfigError(fmt::format("no surface fabric called {}; known: {}", name,
+                                fmt::join(surface_preset_names(), ", ")));
 }
 
 }  // namespace heddle

@@ -1,7 +1,8 @@
 #ifndef HEDDLE_RENDER_SURFACE_SURFACE_PRESETS_H_
 #define HEDDLE_RENDER_SURFACE_SURFACE_PRESETS_H_
-// The surface fabrics that Heddle knows by name: the files configs/fabrics/NAME.toml that have a key `model`, built into
-// the program so that a name works wherever it runs. Tested in tests/render/surface/surface_presets_test.cpp.
+// The surface fabrics that Heddle knows by name: the files configs/fabrics/NAME.toml that have a
+// key `model`, built into the program so that a name works wherever it runs. Tested in
+// tests/render/surface/surface_presets_test.cpp.
 
 #include <string>
 #include <string_view>
@@ -14,7 +15,8 @@ namespace heddle {
 /// Names of all presets, or of those of one model, sorted.
 std::vector<std::string> surface_preset_names(std::string_view model = {});
 
-/// The config of a preset, a fresh document; ConfigError that lists the known names where there is none.
+/// The config of a preset, a fresh document; ConfigError that lists the known names where there is
+/// none.
 TomlTable surface_preset(std::string_view name);
 
 }  // namespace heddle

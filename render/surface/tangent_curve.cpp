@@ -8,7 +8,8 @@
 
 namespace heddle {
 
-std::vector<TangentPiece> tangent_distribution(const std::vector<double>& offsets, const std::vector<double>& lengths) {
+std::vector<TangentPiece> tangent_distribution(const std::vector<double>& offsets,
+                                               const std::vector<double>& lengths) {
   const double total = std::accumulate(lengths.begin(), lengths.end(), 0.0);
   assert(offsets.size() == lengths.size() + 1 && total > 0 && "a curve has a length");
   std::map<double, double> atoms;
@@ -20,7 +21,8 @@ std::vector<TangentPiece> tangent_distribution(const std::vector<double>& offset
     if (offsets[k] == offsets[k + 1]) {
       atoms[offsets[k]] += share;
     } else {
-      ramps.push_back({std::min(offsets[k], offsets[k + 1]), std::max(offsets[k], offsets[k + 1]), share});
+      ramps.push_back(
+          {std::min(offsets[k], offsets[k + 1]), std::max(offsets[k], offsets[k + 1]), share});
       ends.insert(ends.end(), {offsets[k], offsets[k + 1]});
     }
   }
@@ -38,7 +40,8 @@ std::vector<TangentPiece> tangent_distribution(const std::vector<double>& offset
     }
     if (share > 0) pieces.push_back({ends[k], ends[k + 1], share});
   }
-  // Neighbouring ramps of one density (the two halves of a slope, a slope and its way back) are one.
+  // Neighbouring ramps of one density (the two halves of a slope, a slope and its way back) are
+  // one.
   for (std::size_t k = atoms.size(); k + 1 < pieces.size();) {
     TangentPiece& here = pieces[k];
     const TangentPiece& next = pieces[k + 1];

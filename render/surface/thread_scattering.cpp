@@ -2,9 +2,11 @@
 
 namespace heddle {
 
-ThreadScattering::ThreadScattering(const ThreadParameters& parameters, const ThreadConventions& conventions)
+ThreadScattering::ThreadScattering(const ThreadParameters& parameters,
+                                   const ThreadConventions& conventions)
     : parameters_(parameters), fresnel_(conventions.fresnel) {
-  const double deviations = conventions.width == ThreadConventions::Width::kIwasaki ? std::sqrt(0.5) : 1;
+  const double deviations =
+      conventions.width == ThreadConventions::Width::kIwasaki ? std::sqrt(0.5) : 1;
   surface_deviation_ = deviations * parameters.gamma_s;
   volume_deviation_ = deviations * parameters.gamma_v;
   surface_height_ = 1 / (std::sqrt(2 * kPi) * surface_deviation_);
@@ -18,7 +20,8 @@ Rgbd ThreadScattering::value(double theta_i, double phi_i, double theta_r, doubl
     return ThreadDirection<1>{Lanes<1>(std::sin(theta)), Lanes<1>(std::cos(theta) * std::sin(phi)),
                               Lanes<1>(std::cos(theta) * std::cos(phi))};
   };
-  const ThreadValue<1> f = value<1>(thread_angles<1>(direction(theta_i, phi_i), direction(theta_r, phi_r)));
+  const ThreadValue<1> f =
+      value<1>(thread_angles<1>(direction(theta_i, phi_i), direction(theta_r, phi_r)));
   return f.surface[0] + parameters_.albedo * f.volume[0];
 }
 

@@ -1,19 +1,24 @@
 #ifndef HEDDLE_RENDER_SURFACE_THREAD_SCATTERING_H_
 #define HEDDLE_RENDER_SURFACE_THREAD_SCATTERING_H_
-// Scattering of one thread: Sadeghi et al. 2013, "A practical microcylinder appearance model for cloth rendering",
-// equations 2 to 4, with the angles of its figure 9.
+// Scattering of one thread: Sadeghi et al. 2013, "A practical microcylinder appearance model for
+// cloth rendering", equations 2 to 4, with the angles of its figure 9.
 //
-// Thread frame: tangent t, local normal n, binormal b = n x t; directions point away from the thread.
-//   theta = asin(w.t), phi = atan2(w.b, w.n), theta_h, theta_d = (theta_i +- theta_r) / 2, phi_d = phi_i - phi_r
-//   f_s = (Fr cos(phi_d/2) g(gamma_s, theta_h) + A F ((1 - kd) g(gamma_v, theta_h) + kd) / (cos theta_i + cos theta_r))
+// Thread frame: tangent t, local normal n, binormal b = n x t; directions point away from the
+// thread.
+//   theta = asin(w.t), phi = atan2(w.b, w.n), theta_h, theta_d = (theta_i +- theta_r) / 2, phi_d =
+//     phi_i - phi_r
+//   f_s = (Fr cos(phi_d/2) g(gamma_s, theta_h) + A F ((1 - kd) g(gamma_v, theta_h) + kd) / (cos
+//     theta_i + cos theta_r))
 //         / cos^2 theta_d
-// with g a Gaussian of unit area over radians and Fr the exact unpolarised reflectance at the angle whose cosine is
-// cos theta_d cos(phi_d/2). What the text leaves open is named in ThreadConventions. f_s is reciprocal to the last bit; it
-// is not bounded (1/cos^2 theta_d) and not energy conserving: docs/surface-models.md.
+// with g a Gaussian of unit area over radians and Fr the exact unpolarised reflectance at the angle
+// whose cosine is cos theta_d cos(phi_d/2). What the text leaves open is named in
+// ThreadConventions. f_s is reciprocal to the last bit; it is not bounded (1/cos^2 theta_d) and not
+// energy conserving: docs/surface-models.md.
 //
-// No angle is ever subtracted: with v = (cos, sin) of two angles, |v_i + v_r| / 2 and |v_i - v_r| / 2 are the cosine and the
-// sine of half their difference, which wraps phi_d to [-pi, pi] and does not cancel. N directions are computed at once, in
-// double; the arctangent is exact to 5e-14. Tested in tests/render/surface/thread_scattering_test.cpp.
+// No angle is ever subtracted: with v = (cos, sin) of two angles, |v_i + v_r| / 2 and |v_i - v_r| /
+// 2 are the cosine and the sine of half their difference, which wraps phi_d to [-pi, pi] and does
+// not cancel. N directions are computed at once, in double; the arctangent is exact to 5e-14.
+// Tested in tests/render/surface/thread_scattering_test.cpp.
 
 #include <cmath>
 #include <cstdint>
@@ -32,9 +37,11 @@ struct ThreadParameters {
 
 /// Readings of what the text leaves open; the defaults are those of every published figure of ours.
 struct ThreadConventions {
-  /// "Width" of g: its standard deviation (as in Marschner et al. 2003), or w of exp(-x^2 / w^2) (Iwasaki et al. 2014).
+  /// "Width" of g: its standard deviation (as in Marschner et al. 2003), or w of exp(-x^2 / w^2)
+  /// (Iwasaki et al. 2014).
   enum class Width : std::uint8_t { kStandardDeviation, kIwasaki };
-  /// Where the two transmissions F of eq. 3 are taken: (1 - Fr)^2 at the angle of eq. 2, or each at its own angle from n.
+  /// Where the two transmissions F of eq. 3 are taken: (1 - Fr)^2 at the angle of eq. 2, or each at
+  /// its own angle from n.
   enum class Fresnel : std::uint8_t { kHalf, kNormal };
 
   Width width = Width::kStandardDeviation;
@@ -64,8 +71,8 @@ struct ThreadAngles {
   Lanes<N> theta_h_squared, phi_d_squared;
 };
 
-/// Angle whose half has the tangent t, 0 <= t <= 1. Error below 5e-14: atan(x) / x as a polynomial in x^2, by Chebyshev
-/// interpolation on [0, 1].
+/// Angle whose half has the tangent t, 0 <= t <= 1. Error below 5e-14: atan(x) / x as a polynomial
+/// in x^2, by Chebyshev interpolation on [0, 1].
 template <int N>
 Lanes<N> angle_of_half_tangent(const Lanes<N>& t) {
   constexpr double kAtan[] = {
@@ -90,23 +97,27 @@ ThreadAngles<N> thread_angles(const ThreadDirection<N>& wi, const ThreadDirectio
   a.cos_phi_r = wr.normal / a.cos_theta_r;
   const Lanes<N> sin_phi_i = wi.binormal / a.cos_theta_i;
   const Lanes<N> sin_phi_r = wr.binormal / a.cos_theta_r;
-  // exp(i theta_i) + exp(i theta_r) = 2 cos theta_d exp(i theta_h); cosines of theta are not negative.
+  // exp(i theta_i) + exp(i theta_r) = 2 cos theta_d exp(i theta_h); cosines of theta are not
+  // negative.
   const Lanes<N> real = a.cos_theta_i + a.cos_theta_r;
   const Lanes<N> imaginary = wi.tangent + wr.tangent;
   const Lanes<N> modulus = (real.square() + imaginary.square()).sqrt();
   a.cos_theta_d = 0.5 * modulus;
   a.theta_h_squared = angle_of_half_tangent<N>(imaginary.abs() / (modulus + real)).square();
-  a.cos_half_phi_d = 0.5 * ((a.cos_phi_i + a.cos_phi_r).square() + (sin_phi_i + sin_phi_r).square()).sqrt();
+  a.cos_half_phi_d =
+      0.5 * ((a.cos_phi_i + a.cos_phi_r).square() + (sin_phi_i + sin_phi_r).square()).sqrt();
   const Lanes<N> sin_half_phi_d =
       0.5 * ((a.cos_phi_i - a.cos_phi_r).square() + (sin_phi_i - sin_phi_r).square()).sqrt();
   a.phi_d_squared = 4 * angle_of_half_tangent<N>(sin_half_phi_d / (1 + a.cos_half_phi_d)).square();
   return a;
 }
 
-/// Reflectance of a smooth dielectric from outside, unpolarised, for the cosine of the angle to the normal.
+/// Reflectance of a smooth dielectric from outside, unpolarised, for the cosine of the angle to the
+/// normal.
 template <int N>
 Lanes<N> fresnel_reflectance(double ior, const Lanes<N>& cosine) {
-  const Lanes<N> refracted = (ior * ior - 1 + cosine.square()).sqrt();  // ior times the cosine inside
+  // ior times the cosine inside
+  const Lanes<N> refracted = (ior * ior - 1 + cosine.square()).sqrt();
   const Lanes<N> s = (cosine - refracted) / (cosine + refracted);
   const Lanes<N> p = (ior * ior * cosine - refracted) / (ior * ior * cosine + refracted);
   return 0.5 * (s.square() + p.square());
@@ -124,7 +135,8 @@ class ThreadScattering {
 
   template <int N>
   ThreadValue<N> value(const ThreadAngles<N>& a) const {
-    const Lanes<N> reflected = fresnel_reflectance<N>(parameters_.ior, a.cos_theta_d * a.cos_half_phi_d);
+    const Lanes<N> reflected =
+        fresnel_reflectance<N>(parameters_.ior, a.cos_theta_d * a.cos_half_phi_d);
     Lanes<N> entering = (1 - reflected).square();
     if (fresnel_ == ThreadConventions::Fresnel::kNormal) {
       entering = (1 - fresnel_reflectance<N>(parameters_.ior, a.normal_i.max(0.0))) *

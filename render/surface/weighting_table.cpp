@@ -15,7 +15,8 @@
 namespace heddle {
 namespace {
 
-// eq. 9 and 13 of Sadeghi et al.: a product where two cosines are independent, the lesser one where both directions are close.
+// eq. 9 and 13 of Sadeghi et al.: a product where two cosines are independent, the lesser one where
+// both directions are close.
 double blended(double u, double a, double b) {
   return (1 - u) * a * b + u * std::min(a, b);
 }
@@ -36,17 +37,21 @@ Terms terms_of(const TangentSample& tangent, double blend, const Vec3d& wi, cons
   const Vec3d o = frame.transpose() * wo;
   if (i.z() <= 0 || o.z() <= 0) return {};
   const double exponent = -0.5 / (blend * blend);
-  const double u_phi = std::exp(exponent * squared_angle(std::atan2(i.y(), i.z()), std::atan2(o.y(), o.z())));
-  const double u_psi = std::exp(exponent * squared_angle(std::atan2(i.x(), i.z()), std::atan2(o.x(), o.z())));
+  const double u_phi =
+      std::exp(exponent * squared_angle(std::atan2(i.y(), i.z()), std::atan2(o.y(), o.z())));
+  const double u_psi =
+      std::exp(exponent * squared_angle(std::atan2(i.x(), i.z()), std::atan2(o.x(), o.z())));
   return {blended(u_phi, i.z() / std::hypot(i.y(), i.z()), o.z() / std::hypot(o.y(), o.z())),
           blended(u_psi, i.z() / std::hypot(i.x(), i.z()), o.z() / std::hypot(o.x(), o.z()))};
 }
 
 Vec3d spherical(double polar, double azimuth) {
-  return {std::sin(polar) * std::cos(azimuth), std::sin(polar) * std::sin(azimuth), std::cos(polar)};
+  return {std::sin(polar) * std::cos(azimuth), std::sin(polar) * std::sin(azimuth),
+          std::cos(polar)};
 }
 
-// Bilinear position in a grid whose first and last rows are polar angles 0 and `last`, and whose columns go around.
+// Bilinear position in a grid whose first and last rows are polar angles 0 and `last`, and whose
+// columns go around.
 struct GridPosition {
   std::array<std::size_t, 4> cell;
   std::array<double, 4> weight;
@@ -61,7 +66,9 @@ GridPosition grid_position(const Vec3d& direction, int rows, int columns, double
   const int c1 = (c0 + 1) % columns;
   const double down = row - r;
   const double across = column - std::floor(column);
-  const auto at = [&](int i, int j) { return static_cast<std::size_t>(i) * static_cast<std::size_t>(columns) + j; };
+  const auto at = [&](int i, int j) {
+    return static_cast<std::size_t>(i) * static_cast<std::size_t>(columns) + j;
+  };
   return {{at(r, c0), at(r, c1), at(r + 1, c0), at(r + 1, c1)},
           {(1 - down) * (1 - across), (1 - down) * across, down * (1 - across), down * across}};
 }
@@ -108,16 +115,17 @@ std::vector<TangentSample> tangent_samples(const MicrocylinderFabric& fabric, in
       const int count = std::max(1, static_cast<int>(std::ceil(extent / step - 1e-9)));
       for (int k = 0; k < count; ++k) {
         const double angle = piece.begin + extent * (k + 0.5) / count;
-        samples.push_back({static_cast<int>(j), thread.direction, std::sin(angle), std::cos(angle), piece.share / count,
-                           extent / count / std::sqrt(12.0)});
+        samples.push_back({static_cast<int>(j), thread.direction, std::sin(angle), std::cos(angle),
+                           piece.share / count, extent / count / std::sqrt(12.0)});
       }
     }
   }
   return samples;
 }
 
-std::vector<double> thread_weights(const MicrocylinderFabric& fabric, std::span<const TangentSample> tangents,
-                                   Weighting weighting, const Vec3d& wi, const Vec3d& wo) {
+std::vector<double> thread_weights(const MicrocylinderFabric& fabric,
+                                   std::span<const TangentSample> tangents, Weighting weighting,
+                                   const Vec3d& wi, const Vec3d& wo) {
   std::vector<double> weights(tangents.size(), 0.0);
   if (wi.z() <= 0 || wo.z() <= 0) return weights;
   double covered = 0;
@@ -134,11 +142,13 @@ std::vector<double> thread_weights(const MicrocylinderFabric& fabric, std::span<
   return weights;
 }
 
-WeightingTable::WeightingTable(const MicrocylinderFabric& fabric, std::span<const TangentSample> tangents,
-                               Weighting weighting, const WeightingTableSettings& settings)
+WeightingTable::WeightingTable(const MicrocylinderFabric& fabric,
+                               std::span<const TangentSample> tangents, Weighting weighting,
+                               const WeightingTableSettings& settings)
     : columns_(settings.columns), wo_rows_(settings.rows), axis_rows_(2 * settings.rows) {
   assert(settings.columns >= 4 && settings.rows >= 2 && !tangents.empty());
-  // Directions of light that are averaged, and those of the table, which are the limit of great sharpness.
+  // Directions of light that are averaged, and those of the table, which are the limit of great
+  // sharpness.
   struct Incoming {
     Vec3d direction;
     double solid_angle;
@@ -149,7 +159,8 @@ WeightingTable::WeightingTable(const MicrocylinderFabric& fabric, std::span<cons
   for (int row = 0; row < fine_rows; ++row) {
     const double polar = 0.5 * kPi * (row + 0.5) / fine_rows;
     for (int column = 0; column < fine_columns; ++column) {
-      incoming.push_back({spherical(polar, 2 * kPi * (column + 0.5) / fine_columns), std::sin(polar)});
+      incoming.push_back(
+          {spherical(polar, 2 * kPi * (column + 0.5) / fine_columns), std::sin(polar)});
     }
   }
   std::vector<Vec3d> axes;
@@ -165,14 +176,16 @@ WeightingTable::WeightingTable(const MicrocylinderFabric& fabric, std::span<cons
     }
   }
 
-  // W of all tangents, [tangent](incoming then axes, outgoing). Axes below the horizon stand for directions on it.
+  // W of all tangents, [tangent](incoming then axes, outgoing). Axes below the horizon stand for
+  // directions on it.
   const auto fine = static_cast<Eigen::Index>(incoming.size());
   const auto coarse = static_cast<Eigen::Index>(axes.size());
   const auto seen = static_cast<Eigen::Index>(outgoing.size());
   std::vector<Eigen::MatrixXf> weights(tangents.size(), Eigen::MatrixXf(fine + coarse, seen));
   tbb::parallel_for(Eigen::Index{0}, seen, [&](Eigen::Index o) {
     for (Eigen::Index i = 0; i < fine + coarse; ++i) {
-      Vec3d wi = i < fine ? incoming[static_cast<std::size_t>(i)].direction : axes[static_cast<std::size_t>(i - fine)];
+      Vec3d wi = i < fine ? incoming[static_cast<std::size_t>(i)].direction
+                          : axes[static_cast<std::size_t>(i - fine)];
       const double horizon = std::cos(kLastPolar);
       if (wi.z() < horizon) {
         const double across = std::hypot(wi.x(), wi.y());
@@ -188,7 +201,8 @@ WeightingTable::WeightingTable(const MicrocylinderFabric& fabric, std::span<cons
   // Averages over Gaussians as matrices, (axis, incoming), one per finite sharpness.
   std::vector<Eigen::MatrixXf> averages(kLevels - 1, Eigen::MatrixXf(coarse, fine));
   tbb::parallel_for(0, kLevels - 1, [&](int level) {
-    const double sharpness = level == 0 ? 0 : static_cast<double>(kSharpnesses[static_cast<std::size_t>(level - 1)]);
+    const double sharpness =
+        level == 0 ? 0 : static_cast<double>(kSharpnesses[static_cast<std::size_t>(level - 1)]);
     Eigen::MatrixXf& average = averages[static_cast<std::size_t>(level)];
     for (Eigen::Index a = 0; a < coarse; ++a) {
       double nearest = -1;
@@ -256,8 +270,10 @@ WeightingTable::Outgoing WeightingTable::outgoing(const Vec3d& wo) const {
   return result;
 }
 
-double WeightingTable::value(std::size_t tangent, const Outgoing& outgoing, const Vec3d& axis, double sharpness) const {
-  // Position between levels: linear in sharpness up to the first, in its logarithm, and in 1 / sharpness beyond the last.
+double WeightingTable::value(std::size_t tangent, const Outgoing& outgoing, const Vec3d& axis,
+                             double sharpness) const {
+  // Position between levels: linear in sharpness up to the first, in its logarithm, and in 1 /
+  // sharpness beyond the last.
   constexpr double kFirst = static_cast<double>(kSharpnesses.front());
   constexpr double kLast = static_cast<double>(kSharpnesses.back());
   double level = 0;
@@ -280,7 +296,8 @@ double WeightingTable::value(std::size_t tangent, const Outgoing& outgoing, cons
     if (of_level == 0) continue;
     const std::size_t base = static_cast<std::size_t>(low + side) * cells;
     for (std::size_t k = 0; k < 4; ++k) {
-      const float* const values = &axis_[tangent][(base + position.cell[k]) * static_cast<std::size_t>(rank)];
+      const float* const values =
+          &axis_[tangent][(base + position.cell[k]) * static_cast<std::size_t>(rank)];
       sum += of_level * position.weight[k] *
              static_cast<double>(Eigen::Map<const Eigen::VectorXf>(values, rank).dot(right));
     }
@@ -288,7 +305,8 @@ double WeightingTable::value(std::size_t tangent, const Outgoing& outgoing, cons
   return std::max(sum, 0.0);
 }
 
-Float8 WeightingTable::value(std::size_t tangent, const Outgoing& outgoing, const Vec8& axes, Float8 sharpness) const {
+Float8 WeightingTable::value(std::size_t tangent, const Outgoing& outgoing, const Vec8& axes,
+                             Float8 sharpness) const {
   constexpr float kFirst = kSharpnesses.front();
   constexpr float kLast = kSharpnesses.back();
   const Float8 middle = 1 + 0.5F * log2_8(max8(sharpness, splat8(kFirst)) * (1 / kFirst));
@@ -302,7 +320,8 @@ Float8 WeightingTable::value(std::size_t tangent, const Outgoing& outgoing, cons
   const Float8 row = polar * (static_cast<float>(axis_rows_ - 1) / kPif);
   const Float8 turned = atan2_8(axes.y, axes.x) * (static_cast<float>(columns_) / (2 * kPif));
   const Float8 column = turned < 0 ? turned + static_cast<float>(columns_) : turned;
-  const Int8 r = __builtin_convertvector(min8(row, splat8(static_cast<float>(axis_rows_ - 2))), Int8);
+  const Int8 r =
+      __builtin_convertvector(min8(row, splat8(static_cast<float>(axis_rows_ - 2))), Int8);
   const Int8 c = __builtin_convertvector(column, Int8);
   const Float8 down = row - __builtin_convertvector(r, Float8);
   const Float8 across = column - __builtin_convertvector(c, Float8);
@@ -315,13 +334,15 @@ Float8 WeightingTable::value(std::size_t tangent, const Outgoing& outgoing, cons
     const int left = c[k] % columns_;
     const int next = (left + 1) % columns_;
     const int level_step = axis_rows_ * columns_;
-    const float weights[4] = {(1 - down[k]) * (1 - across[k]), (1 - down[k]) * across[k], down[k] * (1 - across[k]),
-                              down[k] * across[k]};
-    const int cells[4] = {row_start + left, row_start + next, row_start + columns_ + left, row_start + columns_ + next};
+    const float weights[4] = {(1 - down[k]) * (1 - across[k]), (1 - down[k]) * across[k],
+                              down[k] * (1 - across[k]), down[k] * across[k]};
+    const int cells[4] = {row_start + left, row_start + next, row_start + columns_ + left,
+                          row_start + columns_ + next};
     const float* from[8];
     float weight[8];
     for (int n = 0; n < 8; ++n) {
-      from[n] = &axis_[tangent][static_cast<std::size_t>(cells[n & 3] + (n < 4 ? 0 : level_step)) * stride];
+      from[n] = &axis_[tangent]
+                      [static_cast<std::size_t>(cells[n & 3] + (n < 4 ? 0 : level_step)) * stride];
       weight[n] = weights[n & 3] * (n < 4 ? 1 - of_high[k] : of_high[k]);
     }
     Float8 sum = {};
@@ -353,7 +374,8 @@ void WeightingTable::write(const std::filesystem::path& path,
   const std::vector<float> outgoing = joined(wo_);
   const std::vector<float> axes = joined(axis_);
   file.add<std::int32_t>("grid", {3}, std::array<std::int32_t, 3>{wo_rows_, axis_rows_, columns_});
-  file.add<std::int32_t>("ranks", {ranks_.size()}, std::vector<std::int32_t>(ranks_.begin(), ranks_.end()));
+  file.add<std::int32_t>("ranks", {ranks_.size()},
+                         std::vector<std::int32_t>(ranks_.begin(), ranks_.end()));
   file.add<float>("outgoing", {outgoing.size()}, outgoing);
   file.add<float>("axes", {axes.size()}, axes);
   file.write(path);
@@ -368,13 +390,15 @@ WeightingTable WeightingTable::read(const std::filesystem::path& path, std::size
   const auto within = [](std::int32_t value, std::int32_t low, std::int32_t high) {
     return low <= value && value <= high;
   };
-  bool fits = within(grid[0], 2, 4096) && within(grid[1], 2, 4096) && within(grid[2], 4, 4096) && ranks.size() == tangents;
+  bool fits = within(grid[0], 2, 4096) && within(grid[1], 2, 4096) && within(grid[2], 4, 4096) &&
+              ranks.size() == tangents;
   std::size_t whole = 0;
   for (const std::int32_t rank : ranks) {
     fits = fits && within(rank, 1, 1 << 24);
     whole += padded(std::max(rank, 0));
   }
-  const std::size_t wo_cells = fits ? static_cast<std::size_t>(grid[0]) * static_cast<std::size_t>(grid[2]) : 0;
+  const std::size_t wo_cells =
+      fits ? static_cast<std::size_t>(grid[0]) * static_cast<std::size_t>(grid[2]) : 0;
   const std::size_t axis_cells =
       fits ? kLevels * static_cast<std::size_t>(grid[1]) * static_cast<std::size_t>(grid[2]) : 0;
   if (!fits || outgoing.size() != wo_cells * whole || axes.size() != axis_cells * whole) {

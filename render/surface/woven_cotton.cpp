@@ -8,7 +8,8 @@
 namespace heddle {
 namespace {
 
-// 0, 1/16 .. 15/16 in a random order, as evenly distributed deviates of mean 0 and standard deviation 1.
+// 0, 1/16 .. 15/16 in a random order, as evenly distributed deviates of mean 0 and standard
+// deviation 1.
 std::array<double, WovenCotton::kVariants> shuffled_deviates(RandomStream& random) {
   constexpr int n = WovenCotton::kVariants;
   std::array<double, n> deviates;
@@ -62,7 +63,8 @@ EnergyScale WovenCotton::make_energy_scale() const {
   const WovenPattern& pattern = parameters_.pattern;
   Rgbd room = Rgbd::Ones();
   for (const YarnSystem system : {YarnSystem::kWarp, YarnSystem::kWeft}) {
-    room -= kPi * pattern.coverage(system) * parameters_.yarns[static_cast<std::size_t>(system)].diffuse;
+    room -= kPi * pattern.coverage(system) *
+            parameters_.yarns[static_cast<std::size_t>(system)].diffuse;
   }
   return EnergyScale([&](const Vec3d& wo) {
     Rgbd sum = Rgbd::Zero();
@@ -77,8 +79,9 @@ EnergyScale WovenCotton::make_energy_scale() const {
         double area = 0;
         for (int v = 0; v < variants_; ++v) {
           const Rectangle whole = {Vec2d::Zero(), floats.size};
-          area += highlight_area(segments_[kind * static_cast<std::size_t>(variants_) + static_cast<std::size_t>(v)],
-                                 half, whole);
+          area += highlight_area(
+              segments_[kind * static_cast<std::size_t>(variants_) + static_cast<std::size_t>(v)],
+              half, whole);
         }
         value += floats.share * area / (variants_ * floats.size.prod()) *
                  parameters_.yarns[static_cast<std::size_t>(floats.system)].specular;
@@ -99,37 +102,44 @@ const WovenSegment& WovenCotton::segment_of(const PlacedFloat& placed) const {
   if (variants_ == 1) return segments_[kind];
   const bool warp = placed.segment->system == YarnSystem::kWarp;
   const bool per_yarn = parameters_.irregularity->per_yarn;
-  const auto item = static_cast<std::uint64_t>(per_yarn ? placed.segment->yarn + (warp ? 0 : 64)
-                                                        : placed.segment - parameters_.pattern.floats().data());
+  const auto item =
+      static_cast<std::uint64_t>(per_yarn ? placed.segment->yarn + (warp ? 0 : 64)
+                                          : placed.segment - parameters_.pattern.floats().data());
   // Along its yarn a segment's address is its repeat; of a yarn as a whole it has none.
   const std::int64_t x = per_yarn && !warp ? 0 : placed.repeat_x;
   const std::int64_t y = per_yarn && warp ? 0 : placed.repeat_y;
   const std::uint64_t repeat =
       mix64(static_cast<std::uint64_t>(x)) + 0x9e3779b97f4a7c15ULL * static_cast<std::uint64_t>(y);
-  RandomStream random(parameters_.irregularity->seed, RandomStage::kWovenIrregularity, item + 1024, repeat);
+  RandomStream random(parameters_.irregularity->seed, RandomStage::kWovenIrregularity, item + 1024,
+                      repeat);
   return segments_[kind * static_cast<std::size_t>(kVariants) + random.index(kVariants)];
 }
 
-void WovenCotton::visit_pieces(const SurfacePoint& point, const std::function<void(const Piece&)>& visitor) const {
+void WovenCotton::visit_pieces(const SurfacePoint& point,
+                               const std::function<void(const Piece&)>& visitor) const {
   const WovenPattern& pattern = parameters_.pattern;
   const Vec2d position = point.position_mm.cast<double>() / parameters_.unit_mm;
-  pattern.visit_footprint(position, point.footprint_mm / parameters_.unit_mm, [&](const FootprintPart& seen) {
-    const YarnSystem system = pattern.kinds()[static_cast<std::size_t>(seen.kind)].system;
-    if (seen.placed != nullptr) {
-      visitor({&segment_of(*seen.placed), system, seen.part, seen.is_point, seen.share});
-      return;
-    }
-    for (int v = 0; v < variants_; ++v) {
-      const WovenSegment& segment = segments_[static_cast<std::size_t>(seen.kind * variants_ + v)];
-      visitor({&segment, system, seen.part, false, seen.share / variants_});
-    }
-  });
+  pattern.visit_footprint(
+      position, point.footprint_mm / parameters_.unit_mm, [&](const FootprintPart& seen) {
+        const YarnSystem system = pattern.kinds()[static_cast<std::size_t>(seen.kind)].system;
+        if (seen.placed != nullptr) {
+          visitor({&segment_of(*seen.placed), system, seen.part, seen.is_point, seen.share});
+          return;
+        }
+        for (int v = 0; v < variants_; ++v) {
+          const WovenSegment& segment =
+              segments_[static_cast<std::size_t>(seen.kind * variants_ + v)];
+          visitor({&segment, system, seen.part, false, seen.share / variants_});
+        }
+      });
 }
 
-Rgbd WovenCotton::reflected_by(const Piece& piece, const Vec2d& half, double cos_i, double reflectance) const {
+Rgbd WovenCotton::reflected_by(const Piece& piece, const Vec2d& half, double cos_i,
+                               double reflectance) const {
   const CottonYarn& yarn = parameters_.yarns[static_cast<std::size_t>(piece.system)];
-  const double share = piece.is_point ? (is_in_highlight(*piece.segment, piece.part.min, half) ? 1.0 : 0.0)
-                                      : highlight_area(*piece.segment, half, piece.part) / piece.part.area();
+  const double share = piece.is_point
+                           ? (is_in_highlight(*piece.segment, piece.part.min, half) ? 1.0 : 0.0)
+                           : highlight_area(*piece.segment, half, piece.part) / piece.part.area();
   return piece.weight * (yarn.diffuse * cos_i + yarn.specular * (share * reflectance));
 }
 
@@ -138,11 +148,13 @@ Rgbd WovenCotton::reflected(const SurfacePoint& point, const Vec3d& wi, const Ve
   if (!(wi.z() > 0.0) || !(wo.z() > 0.0)) return sum;
   const Vec2d half = half_vector(wi, wo);
   const double reflectance = highlight(wi, wo);
-  visit_pieces(point, [&](const Piece& piece) { sum += reflected_by(piece, half, wi.z(), reflectance); });
+  visit_pieces(point,
+               [&](const Piece& piece) { sum += reflected_by(piece, half, wi.z(), reflectance); });
   return sum;
 }
 
-Rgbd WovenCotton::reflected_sg(const SurfacePoint& point, const Vec3d& axis, double sharpness, const Vec3d& wo) const {
+Rgbd WovenCotton::reflected_sg(const SurfacePoint& point, const Vec3d& axis, double sharpness,
+                               const Vec3d& wo) const {
   if (!(wo.z() > 0.0)) return Rgbd::Zero();
   std::vector<Piece> pieces;
   visit_pieces(point, [&](const Piece& piece) { pieces.push_back(piece); });
@@ -168,7 +180,8 @@ double WovenCotton::density(const Vec3d& wi, const Vec3d& wo) const {
     if (std::abs(half.x()) > range.x() || std::abs(half.y()) > range.y()) continue;
     by_half += parameters_.pattern.kinds()[kind].share / (4.0 * range.prod());
   }
-  // Per area of (x, y) -> per solid angle of h: times h.z; of wi: over 4 wo . h, with wo . h = |wi + wo| / 2.
+  // Per area of (x, y) -> per solid angle of h: times h.z; of wi: over 4 wo . h, with wo . h = |wi
+  // + wo| / 2.
   by_half *= half.z() / (2.0 * length);
   return by_cosine + (1.0 - kCosineShare) * by_half;
 }
@@ -205,7 +218,8 @@ std::optional<SurfaceSample> WovenCotton::sample(const SurfacePoint& point, cons
   const double probability = density(*wi, out);
   if (!(probability > 0.0)) return std::nullopt;
   const Rgbd value = reflected(point, *wi, out);
-  return SurfaceSample{wi->cast<float>(), (value / probability).cast<float>(), static_cast<float>(probability)};
+  return SurfaceSample{wi->cast<float>(), (value / probability).cast<float>(),
+                       static_cast<float>(probability)};
 }
 
 WovenCottonParameters read_woven_cotton(const TomlTable& document) {

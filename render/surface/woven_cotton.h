@@ -1,18 +1,20 @@
 #ifndef HEDDLE_RENDER_SURFACE_WOVEN_COTTON_H_
 #define HEDDLE_RENDER_SURFACE_WOVEN_COTTON_H_
-// Irawan and Marschner 2006: every visible thread segment carries an elliptical highlight that slides with the half vector.
-// Near, that is a texture (BTF); far, its mean over the weave is a BRDF in closed form.
+// Irawan and Marschner 2006: every visible thread segment carries an elliptical highlight that
+// slides with the half vector. Near, that is a texture (BTF); far, its mean over the weave is a
+// BRDF in closed form.
 //
-// BTF = diffuse + specular I F G / ((n . wi)(n . wo)), without 1/pi or 1/4, as printed; the BRDF has the share of the window
-// that the ellipse fills in place of I. Ellipse parameters are per system; a window is as long as its float.
+// BTF = diffuse + specular I F G / ((n . wi)(n . wo)), without 1/pi or 1/4, as printed; the BRDF
+// has the share of the window that the ellipse fills in place of I. Ellipse parameters are per
+// system; a window is as long as its float.
 //
-// From near to far: the value is the mean of the BTF over the footprint of WovenPattern::visit_footprint, in closed form (the
-// area of ellipse and square and segment). Both ends are exact, and at every footprint the mean of the values over a repeat
-// is the BRDF.
+// From near to far: the value is the mean of the BTF over the footprint of
+// WovenPattern::visit_footprint, in closed form (the area of ellipse and square and segment). Both
+// ends are exact, and at every footprint the mean of the values over a repeat is the BRDF.
 //
-// Irregular cloth: each segment (or each yarn) draws one of kVariants perturbations of its ellipse, whose mean is 0 in every
-// parameter; the BRDF is the mean over the variants, which is what an endless cloth shows.
-// Tested in tests/render/surface/woven_cotton_test.cpp.
+// Irregular cloth: each segment (or each yarn) draws one of kVariants perturbations of its ellipse,
+// whose mean is 0 in every parameter; the BRDF is the mean over the variants, which is what an
+// endless cloth shows. Tested in tests/render/surface/woven_cotton_test.cpp.
 
 #include <array>
 #include <cstdint>
@@ -52,8 +54,9 @@ struct WovenCottonParameters {
   WovenPattern pattern;
   std::array<CottonYarn, 2> yarns;  // [YarnSystem]
   std::optional<WovenIrregularity> irregularity;
-  /// Less diffuse light where a yarn has more than 0.95, and highlights scaled by energy_scale.h for both directions. Then the
-  /// mean over the cloth returns no more than arrives, and everything stays reciprocal; points may still flash.
+  /// Less diffuse light where a yarn has more than 0.95, and highlights scaled by energy_scale.h
+  /// for both directions. Then the mean over the cloth returns no more than arrives, and everything
+  /// stays reciprocal; points may still flash.
   bool energy_safe = false;
 };
 
@@ -67,9 +70,12 @@ class WovenCotton : public SurfaceModel {
 
   Rgbd reflected(const SurfacePoint& point, const Vec3d& wi, const Vec3d& wo) const override;
   /// Adaptive quadrature (integrate_sg_light, its default settings).
-  Rgbd reflected_sg(const SurfacePoint& point, const Vec3d& axis, double sharpness, const Vec3d& wo) const override;
-  /// Half the draws by cosine, half by a half vector that is uniform (in x and y) where highlights can lie.
-  std::optional<SurfaceSample> sample(const SurfacePoint& point, const Vec3& wo, RandomStream& random) const override;
+  Rgbd reflected_sg(const SurfacePoint& point, const Vec3d& axis, double sharpness,
+                    const Vec3d& wo) const override;
+  /// Half the draws by cosine, half by a half vector that is uniform (in x and y) where highlights
+  /// can lie.
+  std::optional<SurfaceSample> sample(const SurfacePoint& point, const Vec3& wo,
+                                      RandomStream& random) const override;
   float pdf(const SurfacePoint& point, const Vec3& wi, const Vec3& wo) const override;
 
  private:
@@ -81,7 +87,8 @@ class WovenCotton : public SurfaceModel {
     bool is_point;
     double weight;
   };
-  void visit_pieces(const SurfacePoint& point, const std::function<void(const Piece&)>& visitor) const;
+  void visit_pieces(const SurfacePoint& point,
+                    const std::function<void(const Piece&)>& visitor) const;
   /// Of a highlight, with reflectance and geometry; 1 inside it.
   double highlight(const Vec3d& wi, const Vec3d& wo) const;
   Rgbd reflected_by(const Piece& piece, const Vec2d& half, double cos_i, double reflectance) const;
@@ -93,7 +100,8 @@ class WovenCotton : public SurfaceModel {
   WovenCottonParameters parameters_;
   int variants_;                        // 1 or kVariants
   std::vector<WovenSegment> segments_;  // [kind][variant]
-  std::vector<Vec2d> half_range_;       // [kind] the half vectors with a highlight: |x|, |y| at most
+  // [kind] the half vectors with a highlight: |x|, |y| at most
+  std::vector<Vec2d> half_range_;
   std::optional<EnergyScale> energy_scale_;
 };
 

@@ -25,7 +25,8 @@ std::vector<double> edges_of(const std::vector<double>& widths) {
 // The interval of `edges` that holds a coordinate of [0, edges.back()).
 int interval(const std::vector<double>& edges, double coordinate) {
   const auto above = std::upper_bound(edges.begin(), edges.end(), coordinate);
-  return std::clamp(static_cast<int>(above - edges.begin()) - 1, 0, static_cast<int>(edges.size()) - 2);
+  return std::clamp(static_cast<int>(above - edges.begin()) - 1, 0,
+                    static_cast<int>(edges.size()) - 2);
 }
 
 // Rows of 0 and 1 with spaces between them, the top row (the last pick) first.
@@ -43,7 +44,8 @@ Weave parse_matrix(const std::string& text) {
   for (auto row = rows.rbegin(); row != rows.rend(); ++row) {
     if (row->size() != rows[0].size() || row->find_first_not_of("01") != std::string::npos) {
       throw std::invalid_argument(
-          "expected rows of equal length of 0 (weft on top) and 1 (warp on top), such as \"10 01\"");
+          "expected rows of equal length of 0 (weft on top) and 1 (warp on top), such as \"10 "
+          "01\"");
     }
     for (const char crossing : *row) weave.warp_up.push_back(crossing == '1' ? 1 : 0);
   }
@@ -53,10 +55,12 @@ Weave parse_matrix(const std::string& text) {
 std::vector<double> read_widths(const TomlTable& section, const char* key, int yarns) {
   const std::vector<double> cycle = section.numbers(key, {.min = 0.01, .max = 100}, 1, 64);
   if (yarns % static_cast<int>(cycle.size()) != 0) {
-    section.fail(key, fmt::format("expected a list whose length divides the {} yarns of the repeat", yarns));
+    section.fail(
+        key, fmt::format("expected a list whose length divides the {} yarns of the repeat", yarns));
   }
   std::vector<double> widths;
-  for (int i = 0; i < yarns; ++i) widths.push_back(cycle[static_cast<std::size_t>(i) % cycle.size()]);
+  for (int i = 0; i < yarns; ++i)
+    widths.push_back(cycle[static_cast<std::size_t>(i) % cycle.size()]);
   return widths;
 }
 
@@ -66,7 +70,8 @@ WovenPattern::WovenPattern(const Weave& weave, const std::vector<double>& end_wi
                            const std::vector<double>& pick_widths)
     : x_(edges_of(end_widths)), y_(edges_of(pick_widths)) {
   repeat_ = {x_.back(), y_.back()};
-  float_at_.assign(static_cast<std::size_t>(weave.ends) * static_cast<std::size_t>(weave.picks), -1);
+  float_at_.assign(static_cast<std::size_t>(weave.ends) * static_cast<std::size_t>(weave.picks),
+                   -1);
   const auto length_of = [](const std::vector<double>& edges, int i) {
     return edges[static_cast<std::size_t>(i) + 1] - edges[static_cast<std::size_t>(i)];
   };
@@ -85,7 +90,8 @@ WovenPattern::WovenPattern(const Weave& weave, const std::vector<double>& end_wi
         for (int at = first; is_up(yarn, at); ++at) {
           const int crossing = wrapped(at, crossings);
           length += length_of(warp ? y_ : x_, crossing);
-          float_at_[static_cast<std::size_t>(warp ? crossing * weave.ends + yarn : yarn * weave.ends + crossing)] =
+          float_at_[static_cast<std::size_t>(warp ? crossing * weave.ends + yarn
+                                                  : yarn * weave.ends + crossing)] =
               static_cast<int>(floats_.size());
         }
         const double across = length_of(warp ? x_ : y_, yarn);
@@ -93,8 +99,9 @@ WovenPattern::WovenPattern(const Weave& weave, const std::vector<double>& end_wi
         segment.system = system;
         segment.yarn = yarn;
         segment.size = warp ? Vec2d(across, length) : Vec2d(length, across);
-        segment.corner = warp ? Vec2d(x_[static_cast<std::size_t>(yarn)], y_[static_cast<std::size_t>(first)])
-                              : Vec2d(x_[static_cast<std::size_t>(first)], y_[static_cast<std::size_t>(yarn)]);
+        segment.corner =
+            warp ? Vec2d(x_[static_cast<std::size_t>(yarn)], y_[static_cast<std::size_t>(first)])
+                 : Vec2d(x_[static_cast<std::size_t>(first)], y_[static_cast<std::size_t>(yarn)]);
         floats_.push_back(segment);
       }
     }
@@ -126,30 +133,37 @@ double WovenPattern::coverage(YarnSystem system) const {
 }
 
 PlacedFloat WovenPattern::locate(const Vec2d& position) const {
-  const Vec2d repeat(std::floor(position.x() / repeat_.x()), std::floor(position.y() / repeat_.y()));
+  const Vec2d repeat(std::floor(position.x() / repeat_.x()),
+                     std::floor(position.y() / repeat_.y()));
   const Vec2d inside = position - repeat.cwiseProduct(repeat_);
   const auto ends = x_.size() - 1;
-  const auto at =
-      static_cast<std::size_t>(interval(y_, inside.y())) * ends + static_cast<std::size_t>(interval(x_, inside.x()));
+  const auto at = static_cast<std::size_t>(interval(y_, inside.y())) * ends +
+                  static_cast<std::size_t>(interval(x_, inside.x()));
   const WovenFloat& segment = floats_[static_cast<std::size_t>(float_at_[at])];
   PlacedFloat placed;
   placed.segment = &segment;
   // A segment that reaches over the repeat's edge began in the repeat before.
-  placed.repeat_x = static_cast<std::int64_t>(repeat.x()) - (inside.x() < segment.corner.x() ? 1 : 0);
-  placed.repeat_y = static_cast<std::int64_t>(repeat.y()) - (inside.y() < segment.corner.y() ? 1 : 0);
+  placed.repeat_x =
+      static_cast<std::int64_t>(repeat.x()) - (inside.x() < segment.corner.x() ? 1 : 0);
+  placed.repeat_y =
+      static_cast<std::int64_t>(repeat.y()) - (inside.y() < segment.corner.y() ? 1 : 0);
   placed.corner = segment.corner + Vec2d(static_cast<double>(placed.repeat_x) * repeat_.x(),
                                          static_cast<double>(placed.repeat_y) * repeat_.y());
   return placed;
 }
 
-void WovenPattern::visit(const Rectangle& rectangle,
-                         const std::function<void(const PlacedFloat&, const Rectangle&)>& visitor) const {
+void WovenPattern::visit(
+    const Rectangle& rectangle,
+    const std::function<void(const PlacedFloat&, const Rectangle&)>& visitor) const {
   const auto repeat_of = [this](double coordinate, int axis) {
     return static_cast<std::int64_t>(std::floor(coordinate / repeat_[axis]));
   };
-  for (std::int64_t j = repeat_of(rectangle.min.y() - largest_.y(), 1); j <= repeat_of(rectangle.max.y(), 1); ++j) {
-    for (std::int64_t i = repeat_of(rectangle.min.x() - largest_.x(), 0); i <= repeat_of(rectangle.max.x(), 0); ++i) {
-      const Vec2d origin(static_cast<double>(i) * repeat_.x(), static_cast<double>(j) * repeat_.y());
+  for (std::int64_t j = repeat_of(rectangle.min.y() - largest_.y(), 1);
+       j <= repeat_of(rectangle.max.y(), 1); ++j) {
+    for (std::int64_t i = repeat_of(rectangle.min.x() - largest_.x(), 0);
+         i <= repeat_of(rectangle.max.x(), 0); ++i) {
+      const Vec2d origin(static_cast<double>(i) * repeat_.x(),
+                         static_cast<double>(j) * repeat_.y());
       for (const WovenFloat& segment : floats_) {
         const Vec2d corner = origin + segment.corner;
         const Rectangle clip = {(rectangle.min - corner).cwiseMax(0.0),
@@ -174,13 +188,18 @@ void WovenPattern::visit_footprint(const Vec2d& position, double footprint,
   if (whole < 1.0) {
     const Vec2d half_side = Vec2d::Constant(0.5 * footprint);
     const double scale = (1.0 - whole) / (footprint * footprint);
-    visit({position - half_side, position + half_side}, [&](const PlacedFloat& placed, const Rectangle& part) {
-      visitor({placed.segment->kind, &placed, part, false, part.area() * scale});
-    });
+    visit({position - half_side, position + half_side},
+          [&](const PlacedFloat& placed, const Rectangle& part) {
+            visitor({placed.segment->kind, &placed, part, false, part.area() * scale});
+          });
   }
   if (whole > 0.0) {
     for (std::size_t kind = 0; kind < kinds_.size(); ++kind) {
-      visitor({static_cast<int>(kind), nullptr, {Vec2d::Zero(), kinds_[kind].size}, false, whole * kinds_[kind].share});
+      visitor({static_cast<int>(kind),
+               nullptr,
+               {Vec2d::Zero(), kinds_[kind].size},
+               false,
+               whole * kinds_[kind].share});
     }
   }
 }

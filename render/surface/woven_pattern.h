@@ -1,11 +1,13 @@
 #ifndef HEDDLE_RENDER_SURFACE_WOVEN_PATTERN_H_
 #define HEDDLE_RENDER_SURFACE_WOVEN_PATTERN_H_
-// The face of a woven cloth as rectangles: where the warp lies on top, the crossings that follow each other along an end make
-// one visible segment, and so do those along a pick where the weft lies on top.
+// The face of a woven cloth as rectangles: where the warp lies on top, the crossings that follow
+// each other along an end make one visible segment, and so do those along a pick where the weft
+// lies on top.
 //
-// x along the weft (across the ends), y along the warp (across the picks), the repeat is [0, width) x [0, height), periodic.
-// Ends and picks have widths of their own, so the segments need not be square. Lengths in the units of the config.
-// Tested in tests/render/surface/woven_pattern_test.cpp.
+// x along the weft (across the ends), y along the warp (across the picks), the repeat is [0, width)
+// x [0, height), periodic. Ends and picks have widths of their own, so the segments need not be
+// square. Lengths in the units of the config. Tested in
+// tests/render/surface/woven_pattern_test.cpp.
 
 #include <cstdint>
 #include <functional>
@@ -54,8 +56,10 @@ struct FootprintPart {
 
 class WovenPattern {
  public:
-  /// [end] and [pick] widths. Throws std::invalid_argument where a yarn never goes under: its segment would have no end.
-  WovenPattern(const Weave& weave, const std::vector<double>& end_widths, const std::vector<double>& pick_widths);
+  /// [end] and [pick] widths. Throws std::invalid_argument where a yarn never goes under: its
+  /// segment would have no end.
+  WovenPattern(const Weave& weave, const std::vector<double>& end_widths,
+               const std::vector<double>& pick_widths);
 
   const Vec2d& repeat() const { return repeat_; }
   const std::vector<WovenFloat>& floats() const { return floats_; }
@@ -66,13 +70,15 @@ class WovenPattern {
   /// The segment that holds a point.
   PlacedFloat locate(const Vec2d& position) const;
 
-  /// Every segment that shares area with the rectangle, in a fixed order, with that area in the frame of the segment.
+  /// Every segment that shares area with the rectangle, in a fixed order, with that area in the
+  /// frame of the segment.
   void visit(const Rectangle& rectangle,
              const std::function<void(const PlacedFloat&, const Rectangle&)>& visitor) const;
 
-  /// What a footprint sees: the axis-parallel square about the position whose side is the footprint. Below kPointFootprint it
-  /// is a point; from one to two repeats (the longer side of the repeat) it blends into the cloth as a whole, which it is from
-  /// there on. So at every footprint the mean over a repeat of what is seen is the cloth.
+  /// What a footprint sees: the axis-parallel square about the position whose side is the
+  /// footprint. Below kPointFootprint it is a point; from one to two repeats (the longer side of
+  /// the repeat) it blends into the cloth as a whole, which it is from there on. So at every
+  /// footprint the mean over a repeat of what is seen is the cloth.
   void visit_footprint(const Vec2d& position, double footprint,
                        const std::function<void(const FootprintPart&)>& visitor) const;
 
@@ -88,7 +94,8 @@ class WovenPattern {
   std::vector<FloatKind> kinds_;
 };
 
-/// The section [weave] of a woven surface: `notation` and `face` as in fabrics, or `matrix`, and the widths. Errors: ConfigError.
+/// The section [weave] of a woven surface: `notation` and `face` as in fabrics, or `matrix`, and
+/// the widths. Errors: ConfigError.
 WovenPattern read_woven_pattern(const TomlTable& section);
 
 /// A colour of a yarn: three numbers from 0 to `max`.

@@ -22,7 +22,8 @@ double sector(const Vec2d& p, const Vec2d& q) {
 double disc_in_triangle(const Vec2d& p, const Vec2d& q) {
   const Vec2d edge = q - p;
   const double squared_length = edge.squaredNorm();
-  // |edge|^2 times (1 - squared distance of the edge's line from the centre), without cancellation on long edges.
+  // |edge|^2 times (1 - squared distance of the edge's line from the centre), without cancellation
+  // on long edges.
   const double distance = cross(p, edge);
   const double discriminant = squared_length - distance * distance;
   if (!(discriminant > 0.0)) return sector(p, q);
@@ -52,12 +53,13 @@ Vec2d WovenSegment::half_extent() const {
 }
 
 Vec2d highlight_centre(const WovenSegment& segment, const Vec2d& half) {
-  return 0.5 * segment.size.cwiseProduct(segment.k.cwiseProduct(half) + Vec2d::Ones()) + segment.shift;
+  return 0.5 * segment.size.cwiseProduct(segment.k.cwiseProduct(half) + Vec2d::Ones()) +
+         segment.shift;
 }
 
 bool is_in_highlight(const WovenSegment& segment, const Vec2d& point, const Vec2d& half) {
-  const Vec2d focus =
-      segment.semimajor * segment.eccentricity * Vec2d(std::cos(segment.angle), std::sin(segment.angle));
+  const Vec2d focus = segment.semimajor * segment.eccentricity *
+                      Vec2d(std::cos(segment.angle), std::sin(segment.angle));
   const Vec2d from_centre = point - highlight_centre(segment, half);
   return (from_centre - focus).norm() + (from_centre + focus).norm() <= 2.0 * segment.semimajor;
 }
@@ -76,13 +78,18 @@ double highlight_area(const WovenSegment& segment, const Vec2d& half, const Rect
   const double s = std::sin(segment.angle);
   const Vec2d extent(std::hypot(major * c, minor * s), std::hypot(major * s, minor * c));
   if ((low.array() >= extent.array()).any() || (high.array() <= -extent.array()).any()) return 0.0;
-  if ((low.array() <= -extent.array()).all() && (high.array() >= extent.array()).all()) return whole;
+  if ((low.array() <= -extent.array()).all() && (high.array() >= extent.array()).all())
+    return whole;
 
   // The rectangle where the ellipse is the unit disc: the inverse of the matrix of equation 6.
-  const auto to_disc = [&](double x, double y) { return Vec2d((c * x + s * y) / major, (c * y - s * x) / minor); };
+  const auto to_disc = [&](double x, double y) {
+    return Vec2d((c * x + s * y) / major, (c * y - s * x) / minor);
+  };
   const std::array<Vec2d, 4> corner = {to_disc(low.x(), low.y()), to_disc(high.x(), low.y()),
                                        to_disc(high.x(), high.y()), to_disc(low.x(), high.y())};
-  if (std::all_of(corner.begin(), corner.end(), [](const Vec2d& p) { return p.squaredNorm() <= 1.0; })) return window;
+  if (std::all_of(corner.begin(), corner.end(),
+                  [](const Vec2d& p) { return p.squaredNorm() <= 1.0; }))
+    return window;
   double area = 0.0;
   for (std::size_t i = 0; i < 4; ++i) area += disc_in_triangle(corner[i], corner[(i + 1) % 4]);
   return std::clamp(major * minor * area, 0.0, std::min(whole, window));
@@ -98,7 +105,8 @@ double highlight_reflectance(const Vec3d& wi, const Vec3d& wo, double ior) {
   const double sum = (wi + wo).norm();
   if (!(sum > kShortestSum)) return 0.0;
   const double cos_d = std::min(1.0, 0.5 * sum);
-  // 2 (n . h) / (wo . h) = 4 (n . wi + n . wo) / |wi + wo|^2; (n . wi) and (n . wo) of G cancel those of the quotient.
+  // 2 (n . h) / (wo . h) = 4 (n . wi + n . wo) / |wi + wo|^2; (n . wi) and (n . wo) of G cancel
+  // those of the quotient.
   const double facet = 4.0 * (wi.z() + wo.z()) / (sum * sum);
   const double shadowing = std::min({1.0 / wo.z(), facet, facet * (wi.z() / wo.z())});
   return fresnel_dielectric(cos_d, ior) * shadowing;

@@ -16,7 +16,8 @@ double smooth_step(double x) {
   return t * t * (3.0 - 2.0 * t);
 }
 
-// Frame of a segment on the cloth: the warp's is that of the cloth, the weft's is turned by 90 degrees, its y along the weft.
+// Frame of a segment on the cloth: the warp's is that of the cloth, the weft's is turned by 90
+// degrees, its y along the weft.
 Vec3d to_segment(YarnSystem system, const Vec3d& w) {
   return system == YarnSystem::kWarp ? w : Vec3d(-w.y(), w.x(), w.z());
 }
@@ -55,11 +56,13 @@ struct FilamentHighlight {
   // Value of the band at v.
   double value(const YarnSegment& segment, double v, const Vec3d& wi, const Vec3d& wo) const {
     const Vec3d n(std::sin(v), std::sin(u) * std::cos(v), std::cos(u) * std::cos(v));
-    return factor * (radius + 0.5 * segment.width * std::cos(v)) * attenuation(n.dot(wi), n.dot(wo));
+    return factor * (radius + 0.5 * segment.width * std::cos(v)) *
+           attenuation(n.dot(wi), n.dot(wo));
   }
 };
 
-std::optional<FilamentHighlight> filament_highlight(const YarnSegment& segment, const Vec3d& wi, const Vec3d& wo) {
+std::optional<FilamentHighlight> filament_highlight(const YarnSegment& segment, const Vec3d& wi,
+                                                    const Vec3d& wo) {
   const YarnMaterial& material = segment.material;
   const double u_max = material.max_inclination;
   const Vec3d sum = wi + wo;
@@ -71,11 +74,13 @@ std::optional<FilamentHighlight> filament_highlight(const YarnSegment& segment, 
   highlight.u = u;
   highlight.radius = spine_radius(segment, std::min(std::abs(u), sharp_max), sharp_max);
   const double fade =
-      material.smoothing > 0.0 ? 1.0 - smooth_step((std::abs(u) - sharp_max) / (material.smoothing * u_max)) : 1.0;
-  // Area element a (R + a cos v) du dv of the tube over |wi + wo| times what the angle to the tangent changes with u; and
-  // the map of (u, v) to the cloth, spread over the band's width.
-  highlight.factor = 0.5 * segment.width / std::hypot(sum.y(), sum.z()) * phase(material, wi, wo) * fade * kPi /
-                     material.highlight_width;
+      material.smoothing > 0.0
+          ? 1.0 - smooth_step((std::abs(u) - sharp_max) / (material.smoothing * u_max))
+          : 1.0;
+  // Area element a (R + a cos v) du dv of the tube over |wi + wo| times what the angle to the
+  // tangent changes with u; and the map of (u, v) to the cloth, spread over the band's width.
+  highlight.factor = 0.5 * segment.width / std::hypot(sum.y(), sum.z()) * phase(material, wi, wo) *
+                     fade * kPi / material.highlight_width;
   const double band = material.highlight_width * segment.length;
   const double limit = 0.5 * (segment.length - band);
   highlight.centre = std::clamp(0.5 * u * segment.length / u_max, -limit, limit);
@@ -88,12 +93,13 @@ struct StapleHighlight {
   double value;
 };
 
-// v where the fibers at inclination u mirror wi into wo; nothing where there are none or they are hidden.
+// v where the fibers at inclination u mirror wi into wo; nothing where there are none or they are
+// hidden.
 std::optional<double> staple_angle(const YarnSegment& segment, double u, const Vec3d& sum) {
   const double along = sum.y() * std::cos(u) - sum.z() * std::sin(u);
   const double up = sum.y() * std::sin(u) + sum.z() * std::cos(u);
-  // cos(psi) along = sin(psi) (x cos v - up sin v): the fiber, wound about the spine, is perpendicular to the half vector.
-  // Of the two solutions the other one looks down.
+  // cos(psi) along = sin(psi) (x cos v - up sin v): the fiber, wound about the spine, is
+  // perpendicular to the half vector. Of the two solutions the other one looks down.
   const double ratio = along / (std::hypot(sum.x(), up) * std::tan(segment.material.twist));
   if (!(std::abs(ratio) < 1.0)) return std::nullopt;
   const double v = std::acos(ratio) - std::atan2(up, sum.x());
@@ -101,7 +107,8 @@ std::optional<double> staple_angle(const YarnSegment& segment, double u, const V
   return v;
 }
 
-std::optional<StapleHighlight> staple_highlight(const YarnSegment& segment, double u, const Vec3d& wi, const Vec3d& wo,
+std::optional<StapleHighlight> staple_highlight(const YarnSegment& segment, double u,
+                                                const Vec3d& wi, const Vec3d& wo,
                                                 double phase_value) {
   const YarnMaterial& material = segment.material;
   const std::optional<double> v = staple_angle(segment, u, wi + wo);
@@ -112,30 +119,34 @@ std::optional<StapleHighlight> staple_highlight(const YarnSegment& segment, doub
   if (!(cos_i > 0.0) || !(cos_o > 0.0)) return std::nullopt;
   const double a = 0.5 * segment.width;
   const double radius = spine_radius(segment, std::abs(u), material.max_inclination);
-  // As for filaments; what the angle to the tangent changes with v is |sin psi| (n . h), and (n . h) |wi + wo| = cos_i + cos_o.
-  const double geometry = a * (radius + a * std::cos(*v)) / ((cos_i + cos_o) * std::abs(std::sin(material.twist)));
+  // As for filaments; what the angle to the tangent changes with v is |sin psi| (n . h), and (n .
+  // h) |wi + wo| = cos_i + cos_o.
+  const double geometry =
+      a * (radius + a * std::cos(*v)) / ((cos_i + cos_o) * std::abs(std::sin(material.twist)));
   const double band = material.highlight_width * segment.width;
   const double limit = 0.5 * (segment.width - band);
-  return StapleHighlight{
-      std::clamp(*v * segment.width / kPi, -limit, limit),
-      geometry * attenuation(cos_i, cos_o) * phase_value * 2.0 * material.max_inclination / material.highlight_width};
+  return StapleHighlight{std::clamp(*v * segment.width / kPi, -limit, limit),
+                         geometry * attenuation(cos_i, cos_o) * phase_value * 2.0 *
+                             material.max_inclination / material.highlight_width};
 }
 
 double overlap(double low, double high, double centre, double width) {
   return std::max(0.0, std::min(high, centre + 0.5 * width) - std::max(low, centre - 0.5 * width));
 }
 
-double filament_integral(const YarnSegment& segment, const Rectangle& part, const Vec3d& wi, const Vec3d& wo) {
+double filament_integral(const YarnSegment& segment, const Rectangle& part, const Vec3d& wi,
+                         const Vec3d& wo) {
   const std::optional<FilamentHighlight> highlight = filament_highlight(segment, wi, wo);
   if (!highlight) return 0.0;
-  const double height =
-      overlap(part.min.y(), part.max.y(), highlight->centre, segment.material.highlight_width * segment.length);
+  const double height = overlap(part.min.y(), part.max.y(), highlight->centre,
+                                segment.material.highlight_width * segment.length);
   if (height <= 0.0) return 0.0;
   // n . w is proportional to cos(v - v_w): positive within pi/2 of v_w.
   double low = std::max(-0.5 * kPi, part.min.x() * kPi / segment.width);
   double high = std::min(0.5 * kPi, part.max.x() * kPi / segment.width);
   for (const Vec3d& w : {wi, wo}) {
-    const double middle = std::atan2(w.x(), std::sin(highlight->u) * w.y() + std::cos(highlight->u) * w.z());
+    const double middle =
+        std::atan2(w.x(), std::sin(highlight->u) * w.y() + std::cos(highlight->u) * w.z());
     low = std::max(low, middle - 0.5 * kPi);
     high = std::min(high, middle + 0.5 * kPi);
   }
@@ -149,7 +160,8 @@ double filament_integral(const YarnSegment& segment, const Rectangle& part, cons
   return height * sum * 0.5 * (high - low) * segment.width / kPi;
 }
 
-double staple_integral(const YarnSegment& segment, const Rectangle& part, const Vec3d& wi, const Vec3d& wo) {
+double staple_integral(const YarnSegment& segment, const Rectangle& part, const Vec3d& wi,
+                       const Vec3d& wo) {
   const double u_max = segment.material.max_inclination;
   const double per_y = 2.0 * u_max / segment.length;
   const double phase_value = phase(segment.material, wi, wo);
@@ -161,11 +173,14 @@ double staple_integral(const YarnSegment& segment, const Rectangle& part, const 
     const std::optional<StapleHighlight> h = staple_highlight(segment, u, wi, wo, phase_value);
     return h ? h->value * overlap(part.min.x(), part.max.x(), h->centre, band) : 0.0;
   };
-  const auto is_lit = [&](double u) { return staple_highlight(segment, u, wi, wo, phase_value).has_value(); };
+  const auto is_lit = [&](double u) {
+    return staple_highlight(segment, u, wi, wo, phase_value).has_value();
+  };
 
   constexpr int kPanels = 16;  // over the whole segment
   constexpr int kBisections = 20;
-  const int panels = std::max(2, static_cast<int>(std::ceil(kPanels * (high - low) / (2.0 * u_max))));
+  const int panels =
+      std::max(2, static_cast<int>(std::ceil(kPanels * (high - low) / (2.0 * u_max))));
   const QuadratureRule& rule = gauss_legendre(3);
   const double step = (high - low) / panels;
   double sum = 0.0;
@@ -186,7 +201,8 @@ double staple_integral(const YarnSegment& segment, const Rectangle& part, const 
     }
     if (lit || lit_at_end) {
       for (std::size_t i = 0; i < 3; ++i) {
-        sum += rule.weights[i] * 0.5 * (to - from) * integrand(0.5 * (from + to) + 0.5 * (to - from) * rule.nodes[i]);
+        sum += rule.weights[i] * 0.5 * (to - from) *
+               integrand(0.5 * (from + to) + 0.5 * (to - from) * rule.nodes[i]);
       }
     }
     lit = lit_at_end;
@@ -205,8 +221,9 @@ double spine_radius(const YarnSegment& segment, double u, double u_max) {
   // Ratio of the conic's axes: above 0 an ellipse, 0 a parabola, below 0 a hyperbola.
   const double ratio = 1.0 + segment.material.curvature * (1.0 + 1.0 / std::tan(u_max));
   const double slope = std::tan(u);
-  // With y = b s(t), tan(t) or tanh(t) = |ratio| tan(u), all three are one formula: y is proportional to
-  // tan(u) / sqrt(1 + ratio^2 tan^2(u)) or, for the hyperbola, with a minus, and R = (dy/du) / cos(u).
+  // With y = b s(t), tan(t) or tanh(t) = |ratio| tan(u), all three are one formula: y is
+  // proportional to tan(u) / sqrt(1 + ratio^2 tan^2(u)) or, for the hyperbola, with a minus, and R
+  // = (dy/du) / cos(u).
   const double sign = ratio < 0.0 ? -1.0 : 1.0;
   const double q = sign * ratio * ratio;
   const double end_slope = std::tan(u_max);
@@ -215,23 +232,28 @@ double spine_radius(const YarnSegment& segment, double u, double u_max) {
   return scale / (cosine * cosine * cosine * std::pow(1.0 + q * slope * slope, 1.5));
 }
 
-double yarn_highlight(const YarnSegment& segment, const Vec2d& point, const Vec3d& wi, const Vec3d& wo) {
+double yarn_highlight(const YarnSegment& segment, const Vec2d& point, const Vec3d& wi,
+                      const Vec3d& wo) {
   const YarnMaterial& material = segment.material;
   if (!segment.has_spine()) return 0.0;
   if (material.twist == 0.0) {
     const std::optional<FilamentHighlight> highlight = filament_highlight(segment, wi, wo);
     if (!highlight) return 0.0;
-    if (std::abs(point.y() - highlight->centre) >= 0.5 * material.highlight_width * segment.length) return 0.0;
+    if (std::abs(point.y() - highlight->centre) >= 0.5 * material.highlight_width * segment.length)
+      return 0.0;
     return highlight->value(segment, point.x() * kPi / segment.width, wi, wo);
   }
   const double u = 2.0 * point.y() * material.max_inclination / segment.length;
-  const std::optional<StapleHighlight> highlight = staple_highlight(segment, u, wi, wo, phase(material, wi, wo));
+  const std::optional<StapleHighlight> highlight =
+      staple_highlight(segment, u, wi, wo, phase(material, wi, wo));
   if (!highlight) return 0.0;
-  if (std::abs(point.x() - highlight->centre) >= 0.5 * material.highlight_width * segment.width) return 0.0;
+  if (std::abs(point.x() - highlight->centre) >= 0.5 * material.highlight_width * segment.width)
+    return 0.0;
   return highlight->value;
 }
 
-double yarn_highlight_integral(const YarnSegment& segment, const Rectangle& part, const Vec3d& wi, const Vec3d& wo) {
+double yarn_highlight_integral(const YarnSegment& segment, const Rectangle& part, const Vec3d& wi,
+                               const Vec3d& wo) {
   if (!segment.has_spine()) return 0.0;
   return segment.material.twist == 0.0 ? filament_integral(segment, part, wi, wo)
                                        : staple_integral(segment, part, wi, wo);
@@ -240,7 +262,8 @@ double yarn_highlight_integral(const YarnSegment& segment, const Rectangle& part
 WovenYarns::WovenYarns(WovenYarnsParameters parameters) : parameters_(std::move(parameters)) {
   for (const FloatKind& kind : parameters_.pattern.kinds()) {
     const bool warp = kind.system == YarnSystem::kWarp;
-    segments_.push_back({parameters_.yarns[static_cast<std::size_t>(kind.system)], warp ? kind.size.x() : kind.size.y(),
+    segments_.push_back({parameters_.yarns[static_cast<std::size_t>(kind.system)],
+                         warp ? kind.size.x() : kind.size.y(),
                          warp ? kind.size.y() : kind.size.x()});
   }
   for (const YarnSystem system : {YarnSystem::kWarp, YarnSystem::kWeft}) {
@@ -265,7 +288,8 @@ double WovenYarns::far_highlight(std::size_t kind, const Vec3d& wi, const Vec3d&
   const FloatKind& floats = parameters_.pattern.kinds()[kind];
   const Rectangle whole = to_segment(floats, {Vec2d::Zero(), floats.size});
   return floats.share / whole.area() * highlight_scale_[static_cast<std::size_t>(floats.system)] *
-         yarn_highlight_integral(segments_[kind], whole, to_segment(floats.system, wi), to_segment(floats.system, wo));
+         yarn_highlight_integral(segments_[kind], whole, to_segment(floats.system, wi),
+                                 to_segment(floats.system, wo));
 }
 
 EnergyScale WovenYarns::make_energy_scale() const {
@@ -292,7 +316,8 @@ EnergyScale WovenYarns::make_energy_scale() const {
 }
 
 double WovenYarns::highlight_albedo() const {
-  // Pairs of cosine-distributed directions on a lattice of four dimensions (Roberts' generalised golden ratios).
+  // Pairs of cosine-distributed directions on a lattice of four dimensions (Roberts' generalised
+  // golden ratios).
   constexpr int kPairs = 16384;
   double sum = 0.0;
   for (int n = 0; n < kPairs; ++n) {
@@ -336,14 +361,17 @@ Rgbd WovenYarns::reflected(const SurfacePoint& point, const Vec3d& wi, const Vec
       highlight = *known;
     }
     const YarnMaterial& yarn = parameters_.yarns[system];
-    sum += seen.share * wi.z() * (yarn.diffuse / kPi + yarn.specular * (safe * highlight * highlight_scale_[system]));
+    sum += seen.share * wi.z() *
+           (yarn.diffuse / kPi + yarn.specular * (safe * highlight * highlight_scale_[system]));
   });
   return sum;
 }
 
-Rgbd WovenYarns::reflected_sg(const SurfacePoint& point, const Vec3d& axis, double sharpness, const Vec3d& wo) const {
+Rgbd WovenYarns::reflected_sg(const SurfacePoint& point, const Vec3d& axis, double sharpness,
+                              const Vec3d& wo) const {
   if (!(wo.z() > 0.0)) return Rgbd::Zero();
-  return integrate_sg_light(axis, sharpness, [&](const Vec3d& wi) { return reflected(point, wi, wo); },
+  return integrate_sg_light(axis, sharpness,
+                            [&](const Vec3d& wi) { return reflected(point, wi, wo); },
                             {.tolerance = 0.01, .max_points = 10946});
 }
 
@@ -371,7 +399,8 @@ float WovenYarns::pdf(const SurfacePoint& /*point*/, const Vec3& wi, const Vec3&
 /// The direction that three numbers in [0, 1) stand for; nothing where there is none.
 std::optional<Vec3d> WovenYarns::draw(double choice, double a, double b, const Vec3d& wo) const {
   if (choice < kCosineShare) return cosine_direction(a, b);
-  const YarnSystem system = choice < kCosineShare + 0.5 * (1.0 - kCosineShare) ? YarnSystem::kWarp : YarnSystem::kWeft;
+  const YarnSystem system =
+      choice < kCosineShare + 0.5 * (1.0 - kCosineShare) ? YarnSystem::kWarp : YarnSystem::kWeft;
   const double inclination = inclination_range_[static_cast<std::size_t>(system)] * (2.0 * a - 1.0);
   const double x = 2.0 * b - 1.0;
   const double rest = std::sqrt(1.0 - x * x);
@@ -380,7 +409,8 @@ std::optional<Vec3d> WovenYarns::draw(double choice, double a, double b, const V
   return 2.0 * h.dot(wo) * h - wo;
 }
 
-std::optional<SurfaceSample> WovenYarns::sample(const SurfacePoint& point, const Vec3& wo, RandomStream& random) const {
+std::optional<SurfaceSample> WovenYarns::sample(const SurfacePoint& point, const Vec3& wo,
+                                                RandomStream& random) const {
   const Vec3d out = wo.cast<double>();
   const double choice = random.uniform_double();
   const double a = random.uniform_double();
@@ -390,7 +420,8 @@ std::optional<SurfaceSample> WovenYarns::sample(const SurfacePoint& point, const
   const double probability = density(*wi, out);
   if (!(probability > 0.0)) return std::nullopt;
   const Rgbd value = reflected(point, *wi, out);
-  return SurfaceSample{wi->cast<float>(), (value / probability).cast<float>(), static_cast<float>(probability)};
+  return SurfaceSample{wi->cast<float>(), (value / probability).cast<float>(),
+                       static_cast<float>(probability)};
 }
 
 WovenYarnsParameters read_woven_yarns(const TomlTable& document) {
@@ -402,10 +433,12 @@ WovenYarnsParameters read_woven_yarns(const TomlTable& document) {
     yarn.uniform = table.number("alpha", {.min = 0, .max = 100});
     yarn.forward = table.number("beta", {.min = 0, .max = 1000});
     yarn.twist = radians(table.number("psi_deg", {.min = -89, .max = 89}));
-    yarn.max_inclination = radians(table.number("umax_deg", {.min = 0, .max = 89, .exclusive_min = true}));
+    yarn.max_inclination =
+        radians(table.number("umax_deg", {.min = 0, .max = 89, .exclusive_min = true}));
     yarn.curvature = table.number("kappa", {.min = -1, .max = 100, .exclusive_min = true});
     yarn.smoothing = table.number("smoothing", {.min = 0, .max = 0.99}, 0);
-    yarn.highlight_width = table.number("highlight_width", {.min = 0, .max = 1, .exclusive_min = true}, 0.5);
+    yarn.highlight_width =
+        table.number("highlight_width", {.min = 0, .max = 1, .exclusive_min = true}, 0.5);
     return yarn;
   };
   WovenYarnsParameters parameters{

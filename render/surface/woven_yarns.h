@@ -1,18 +1,23 @@
 #ifndef HEDDLE_RENDER_SURFACE_WOVEN_YARNS_H_
 #define HEDDLE_RENDER_SURFACE_WOVEN_YARNS_H_
-// Irawan and Marschner 2012: specular reflection from the fibers of bent yarn segments; the rival of the microcylinder model.
+// Irawan and Marschner 2012: specular reflection from the fibers of bent yarn segments; the rival
+// of the microcylinder model.
 //
-// A segment is a tube of radius w/2 about a spine that is an arc of a conic: (u, v) is the inclination of the spine, in
-// [-u_max, u_max], and the angle around the yarn, in [-pi/2, pi/2]. Segment frame: x across the yarn, y along it, z up,
-// origin in the middle; on the cloth y = u l / (2 u_max), x = v w / pi. Fibers wind about the spine at the twist angle; twist 0
-// is a filament yarn, anything else a staple yarn. For two directions the fibers that mirror one into the other lie on a
-// curve: u(v) = const for filaments, v(u) for staples; the highlight is a band of constant width along it.
-// Lengths are in units of the config. The absolute scale of the highlights goes with the square of the unit, as the mean over
-// a segment is not divided by its area: `specular` absorbs it, or the option specular_is_albedo replaces it.
+// A segment is a tube of radius w/2 about a spine that is an arc of a conic: (u, v) is the
+// inclination of the spine, in
+// [-u_max, u_max], and the angle around the yarn, in [-pi/2, pi/2]. Segment frame: x across the
+// yarn, y along it, z up, origin in the middle; on the cloth y = u l / (2 u_max), x = v w / pi.
+// Fibers wind about the spine at the twist angle; twist 0 is a filament yarn, anything else a
+// staple yarn. For two directions the fibers that mirror one into the other lie on a curve: u(v) =
+// const for filaments, v(u) for staples; the highlight is a band of constant width along it.
+// Lengths are in units of the config. The absolute scale of the highlights goes with the square of
+// the unit, as the mean over a segment is not divided by its area: `specular` absorbs it, or the
+// option specular_is_albedo replaces it.
 //
-// The paper is not at hand. What is here is derived from the geometry above and agrees with the terms that public
-// renderers document (Mitsuba 0.x plugin "irawan", LuxCore "cloth"); docs/surface-models.md says what is left out.
-// Tested in tests/render/surface/woven_yarns_test.cpp.
+// The paper is not at hand. What is here is derived from the geometry above and agrees with the
+// terms that public renderers document (Mitsuba 0.x plugin "irawan", LuxCore "cloth");
+// docs/surface-models.md says what is left out. Tested in
+// tests/render/surface/woven_yarns_test.cpp.
 
 #include <array>
 #include <vector>
@@ -31,8 +36,10 @@ struct YarnMaterial {
   double forward = 0.0;          // beta: concentration of the forward scattering
   double twist = 0.0;            // psi, radians; 0: filament
   double max_inclination = 0.0;  // u_max, radians, in (0, pi/2)
-  double curvature = 0.0;        // kappa > -1 of the spine: 0 a circle; above, the middle is flatter; below, the ends
-  double smoothing = 0.0;        // ss in [0, 1), filaments only: share of u_max over which the highlight fades
+  // kappa > -1 of the spine: 0 a circle; above, the middle is flatter; below, the ends
+  double curvature = 0.0;
+  // ss in [0, 1), filaments only: share of u_max over which the highlight fades
+  double smoothing = 0.0;
   double highlight_width = 0.5;  // of the band, in (0, 1], relative to the segment
 };
 
@@ -41,36 +48,41 @@ struct YarnSegment {
   double width;   // across the yarn
   double length;  // along it
 
-  /// Is the segment longer than the arc that its own thickness takes, width * sin(max_inclination)? Those that are not have no
-  /// highlight: the weft of the public twill preset is one.
+  /// Is the segment longer than the arc that its own thickness takes, width * sin(max_inclination)?
+  /// Those that are not have no highlight: the weft of the public twill preset is one.
   bool has_spine() const;
 };
 
-/// Radius of curvature of the spine where its inclination is u, |u| <= u_max < pi/2. The spine spans
-/// length - width sin(u_max) along y: the integral of R cos(u) du.
+/// Radius of curvature of the spine where its inclination is u, |u| <= u_max < pi/2. The spine
+/// spans length - width sin(u_max) along y: the integral of R cos(u) du.
 double spine_radius(const YarnSegment& segment, double u, double u_max);
 
-/// Specular value at a point (x, y) of the segment without k_s, 1/sr in squares of the unit. Both directions are in the
-/// segment's frame, above the cloth. Reciprocal; a step at the edges of the band.
-double yarn_highlight(const YarnSegment& segment, const Vec2d& point, const Vec3d& wi, const Vec3d& wo);
+/// Specular value at a point (x, y) of the segment without k_s, 1/sr in squares of the unit. Both
+/// directions are in the segment's frame, above the cloth. Reciprocal; a step at the edges of the
+/// band.
+double yarn_highlight(const YarnSegment& segment, const Vec2d& point, const Vec3d& wi,
+                      const Vec3d& wo);
 
-/// Integral of yarn_highlight over a part of the segment. Filaments: Gauss-Legendre on a smooth integrand; staples: panels
-/// cut where the curve begins and ends. Error relative to the largest value over directions: below 1e-3.
-double yarn_highlight_integral(const YarnSegment& segment, const Rectangle& part, const Vec3d& wi, const Vec3d& wo);
+/// Integral of yarn_highlight over a part of the segment. Filaments: Gauss-Legendre on a smooth
+/// integrand; staples: panels cut where the curve begins and ends. Error relative to the largest
+/// value over directions: below 1e-3.
+double yarn_highlight_integral(const YarnSegment& segment, const Rectangle& part, const Vec3d& wi,
+                               const Vec3d& wo);
 
 struct WovenYarnsParameters {
   double unit_mm = 1.0;
   WovenPattern pattern;
   std::array<YarnMaterial, 2> yarns;  // [YarnSystem]
-  /// Scales the highlights so that with k_s = 1 everywhere they return all light that comes evenly from the whole upper side,
-  /// as LuxCore does: k_s up to 1 - k_d then keeps energy on that average (not for every single direction).
+  /// Scales the highlights so that with k_s = 1 everywhere they return all light that comes evenly
+  /// from the whole upper side, as LuxCore does: k_s up to 1 - k_d then keeps energy on that
+  /// average (not for every single direction).
   bool specular_is_albedo = false;
   /// As in WovenCottonParameters: for every single direction.
   bool energy_safe = false;
 };
 
-/// Each system's highlight is divided by its coverage, so that the far value is the sum of the two systems' means.
-/// Near and far meet as in woven_cotton.h, in WovenPattern::visit_footprint.
+/// Each system's highlight is divided by its coverage, so that the far value is the sum of the two
+/// systems' means. Near and far meet as in woven_cotton.h, in WovenPattern::visit_footprint.
 class WovenYarns : public SurfaceModel {
  public:
   explicit WovenYarns(WovenYarnsParameters parameters);
@@ -79,9 +91,12 @@ class WovenYarns : public SurfaceModel {
 
   Rgbd reflected(const SurfacePoint& point, const Vec3d& wi, const Vec3d& wo) const override;
   /// Adaptive quadrature (integrate_sg_light) to 1 %.
-  Rgbd reflected_sg(const SurfacePoint& point, const Vec3d& axis, double sharpness, const Vec3d& wo) const override;
-  /// Half the draws by cosine, half by a half vector perpendicular to the spine at an even inclination.
-  std::optional<SurfaceSample> sample(const SurfacePoint& point, const Vec3& wo, RandomStream& random) const override;
+  Rgbd reflected_sg(const SurfacePoint& point, const Vec3d& axis, double sharpness,
+                    const Vec3d& wo) const override;
+  /// Half the draws by cosine, half by a half vector perpendicular to the spine at an even
+  /// inclination.
+  std::optional<SurfaceSample> sample(const SurfacePoint& point, const Vec3& wo,
+                                      RandomStream& random) const override;
   float pdf(const SurfacePoint& point, const Vec3& wi, const Vec3& wo) const override;
 
  private:

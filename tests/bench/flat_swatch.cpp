@@ -1,28 +1,37 @@
-// How far the precomputed methods are from path tracing on a flat, endless cloth: 41 views x 12 directional lights, as in
-// Figure 13 of Khungurn 2017. Not a test: it prints, and writes PREFIX.csv (every value) and PREFIX.svg (curves).
+// How far the precomputed methods are from path tracing on a flat, endless cloth: 41 views x 12
+// directional lights, as in Figure 13 of Khungurn 2017. Not a test: it prints, and writes
+// PREFIX.csv (every value) and PREFIX.svg (curves).
 //
-//   heddle_flat_swatch PACK [--printed PACK] [--paths N] [--floor-paths K] [--sharpness L] [--no-rivals] [--seed S] [--out PREFIX]
+//   heddle_flat_swatch PACK [--printed PACK] [--paths N] [--floor-paths K] [--sharpness L]
+//     [--no-rivals] [--seed S] [--out PREFIX]
 //
-// Views: theta_o = -80, -76, .. 80 degrees in the xz plane. Lights: theta = 10, 30, 50, 70 degrees at azimuths 0, 60, 135
-// degrees from +x, irradiance 1 across the light's axis; with --sharpness spherical Gaussians about the same axes, for which the
-// reference draws one direction per eye ray, and of which only what lies above the horizon shines. Values: radiance averaged over the tile, rgb.
-// One walk of the reference serves all lights: next-event estimation of each at every vertex.
+// Views: theta_o = -80, -76, .. 80 degrees in the xz plane. Lights: theta = 10, 30, 50, 70 degrees
+// at azimuths 0, 60, 135 degrees from +x, irradiance 1 across the light's axis; with --sharpness
+// spherical Gaussians about the same axes, for which the reference draws one direction per eye ray,
+// and of which only what lies above the horizon shines. Values: radiance averaged over the tile,
+// rgb. One walk of the reference serves all lights: next-event estimation of each at every vertex.
 // The methods shade the same eye rays:
-//   exact     eye rays against the fibers, single scattering by SSDF sign, multiple scattering by the cells' transfer
+//   exact     eye rays against the fibers, single scattering by SSDF sign, multiple scattering by
+//             the cells' transfer
 //   volume    the same with eye rays through the id volume
-//   origin    exact, with the visibility of single scattering from a shadow ray at the segment's origin: what the SSDF
-//             encodes
-//   floor     exact, with the single scattering of the reference, and multiple scattering by the transfer to the hit point
-//             itself, to the same SH order: what the truncation alone costs. K paths from the hit point per eye ray, each
-//             4 pi * throughput * K(w0 . light) * sum over j of Y_j(w1) c_S[j], K(w0) = sum of
-//             Y_j(w0) c_light[j] with the light projected as by the renderer (MultipleScattering::LightShape);
-//             directional lights only.
-//   path-6, prt, tsai-shih-16, tsai-shih-full, dual-scattering, and printed where its pack is named: as `heddle render` names
-//             them (docs/rivals.md); tsai-shih-plain is tsai-shih-16 by the plain matrix (render/rivals/bcsdf_factors.h). A pack for `printed` comes from a render with that method.
+//   origin    exact, with the visibility of single scattering from a shadow ray at the segment's
+//             origin: what the SSDF encodes
+//   floor     exact, with the single scattering of the reference, and multiple scattering by the
+//             transfer to the hit point itself, to the same SH order: what the truncation alone
+//             costs. K paths from the hit point per eye ray, each 4 pi * throughput * K(w0 . light)
+//             * sum over j of Y_j(w1) c_S[j], K(w0) = sum of Y_j(w0) c_light[j] with the light
+//             projected as by the renderer (MultipleScattering::LightShape); directional lights
+//             only.
+//   path-6, prt, tsai-shih-16, tsai-shih-full, dual-scattering, and printed where its pack is
+//     named: as `heddle render` names
+//             them (docs/rivals.md); tsai-shih-plain is tsai-shih-16 by the plain matrix
+//               (render/rivals/bcsdf_factors.h). A pack for `printed` comes from a render with that
+//               method.
 //
-// Error: sqrt(mean of (F1 - R1)(F2 - R2)) / mean R, where 1 and 2 are two independent halves of all samples, so that
-// neither the reference's noise nor the methods' own counts. A method shares eye rays with the half of the reference it is
-// compared with, which takes out the noise that they have in common.
+// Error: sqrt(mean of (F1 - R1)(F2 - R2)) / mean R, where 1 and 2 are two independent halves of all
+// samples, so that neither the reference's noise nor the methods' own counts. A method shares eye
+// rays with the half of the reference it is compared with, which takes out the noise that they have
+// in common.
 
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
@@ -67,7 +76,8 @@ double view_degrees(int view) {
 Vec3 direction_of(double theta_degrees, double azimuth_degrees) {
   const double theta = radians(theta_degrees);
   const double azimuth = radians(azimuth_degrees);
-  return Vec3d(std::sin(theta) * std::cos(azimuth), std::sin(theta) * std::sin(azimuth), std::cos(theta))
+  return Vec3d(std::sin(theta) * std::cos(azimuth), std::sin(theta) * std::sin(azimuth),
+               std::cos(theta))
       .cast<float>();
 }
 
@@ -94,18 +104,19 @@ enum Method {
   kMethods
 };
 constexpr std::array<const char*, kMethods> kMethodNames = {
-    "reference", "exact", "volume", "origin", "floor", "path-6", "printed", "prt", "tsai-shih-16",
-    "tsai-shih-plain", "tsai-shih-full", "dual-scattering"};
+    "reference", "exact", "volume",       "origin",          "floor",          "path-6",
+    "printed",   "prt",   "tsai-shih-16", "tsai-shih-plain", "tsai-shih-full", "dual-scattering"};
 enum Part { kSingle, kMultiple, kTotal, kParts };
 constexpr std::array<const char*, kParts> kPartNames = {"single", "multiple", "total"};
 
-using Values = std::array<Rgbd, kLights>;                          // [light]
-using MethodValues = std::array<std::array<Values, 2>, kMethods>;  // [method][single, multiple][light]
-using Half = std::vector<MethodValues>;                            // [view]
+using Values = std::array<Rgbd, kLights>;  // [light]
+// [method][single, multiple][light]
+using MethodValues = std::array<std::array<Values, 2>, kMethods>;
+using Half = std::vector<MethodValues>;  // [view]
 
 struct Options {
   std::string pack;
-  std::string printed;  // the pack of `printed`; that method is left out where empty
+  std::string printed;             // the pack of `printed`; that method is left out where empty
   std::optional<float> sharpness;  // of the lights; directional where absent
   bool rivals = true;
   int paths = 4096;
@@ -124,28 +135,31 @@ class Swatch {
         options_(options),
         scene_(pack.exemplar),
         trace_(scene_),
-        origins_(
-            find_segment_origins(scene_, pack.light_from_both_sides, OriginChoice::kExposed, options.seed)),
+        origins_(find_segment_origins(scene_, pack.light_from_both_sides, OriginChoice::kExposed,
+                                      options.seed)),
         bricks_(*pack.volume),
         single_(&*pack.ssdf, pack.sgs ? &*pack.sgs : nullptr, pack.materials),
         multiple_(*pack.transfer, pack.materials, pack.bundle_tangent),
         shape_(options.sharpness),
         printed_shape_(options.sharpness, LightShape::FaceLight::kPrinted),
         prt_(*pack.ssdf, pack.light_from_both_sides, pack.materials),
-        tsai_shih_16_(*pack.ssdf, pack.light_from_both_sides, pack.materials, BcsdfFactors::kRecommendedTerms),
-        tsai_shih_plain_(*pack.ssdf, pack.light_from_both_sides, pack.materials, BcsdfFactors::kRecommendedTerms,
-                         BcsdfFactors::Matrix::kPlain),
-        tsai_shih_full_(*pack.ssdf, pack.light_from_both_sides, pack.materials, BcsdfFactors::kAllTerms),
+        tsai_shih_16_(*pack.ssdf, pack.light_from_both_sides, pack.materials,
+                      BcsdfFactors::kRecommendedTerms),
+        tsai_shih_plain_(*pack.ssdf, pack.light_from_both_sides, pack.materials,
+                         BcsdfFactors::kRecommendedTerms, BcsdfFactors::Matrix::kPlain),
+        tsai_shih_full_(*pack.ssdf, pack.light_from_both_sides, pack.materials,
+                        BcsdfFactors::kAllTerms),
         dual_(scene_, pack.materials),
         strata_(std::max(1, static_cast<int>(std::lround(std::sqrt(options.paths / 2.0))))) {
     for (int l = 0; l < kLights; ++l) {
       lights_[l] = direction_of(light_theta(l), light_azimuth(l));
       MultipleScattering::LightShape(std::nullopt)
-          .project(pack.transfer->order, pack.transfer->both_sides, lights_[l], projected_[l].data());
+          .project(pack.transfer->order, pack.transfer->both_sides, lights_[l],
+                   projected_[l].data());
     }
     if (printed != nullptr) {
-      printed_single_.emplace(&*printed->ssdf, printed->sgs ? &*printed->sgs : nullptr, printed->materials,
-                              kPrintedBlend, SgMethod::kPrinted);
+      printed_single_.emplace(&*printed->ssdf, printed->sgs ? &*printed->sgs : nullptr,
+                              printed->materials, kPrintedBlend, SgMethod::kPrinted);
       printed_multiple_.emplace(*printed->transfer, printed->materials);
     }
   }
@@ -166,48 +180,57 @@ class Swatch {
     const Exemplar& exemplar = pack_.exemplar;
     const double scale = 1.0 / (strata_ * strata_);
     for (int i = 0; i < strata_ * strata_; ++i) {
-      RandomStream random(options_.seed, RandomStage::kBench, static_cast<std::uint64_t>(2 * view + half), i);
+      RandomStream random(options_.seed, RandomStage::kBench,
+                          static_cast<std::uint64_t>(2 * view + half), i);
       // A point on the plane that touches the cloth from above, one per stratum of the tile.
-      const float x = (static_cast<float>(i % strata_) + random.uniform()) / static_cast<float>(strata_);
-      const float y = (static_cast<float>(i / strata_) + random.uniform()) / static_cast<float>(strata_);
+      const float x =
+          (static_cast<float>(i % strata_) + random.uniform()) / static_cast<float>(strata_);
+      const float y =
+          (static_cast<float>(i / strata_) + random.uniform()) / static_cast<float>(strata_);
       const Vec3 origin(x * exemplar.width_mm, y * exemplar.height_mm, exemplar.z_max);
       if (const auto vertex = trace_.first(origin, -wo)) {
         std::array<Vec3, kLights> towards = lights_;
         if (options_.sharpness) {
-          for (Vec3& light : towards) light = sample_spherical_gaussian(light, *options_.sharpness, random);
+          for (Vec3& light : towards)
+            light = sample_spherical_gaussian(light, *options_.sharpness, random);
         }
         add_reference(*vertex, wo, towards, random, scale, sum);
         add_precomputed(vertex->segment, vertex->tangent, wo, scale, sum[kExact]);
         add_origin_single(*vertex, wo, towards, scale, sum[kOrigin][kSingle]);
         for (int k = 0; k < options_.floor_paths && has(kFloor); ++k) {
-          add_floor_multiple(*vertex, wo, random, scale / options_.floor_paths, sum[kFloor][kMultiple]);
+          add_floor_multiple(*vertex, wo, random, scale / options_.floor_paths,
+                             sum[kFloor][kMultiple]);
         }
         if (options_.rivals) add_rivals(*vertex, wo, towards, scale, sum);
       }
       if (const auto hit = bricks_.first_hit({origin, -wo})) {
-        add_precomputed(hit->segment, exemplar.segment_tangent(hit->segment), wo, scale, sum[kVolume]);
+        add_precomputed(hit->segment, exemplar.segment_tangent(hit->segment), wo, scale,
+                        sum[kVolume]);
       }
     }
     sum[kOrigin][kMultiple] = sum[kExact][kMultiple];
     sum[kFloor][kSingle] = sum[kReference][kSingle];
     sum[kPath6][kSingle] = sum[kReference][kSingle];
-    for (const Method method : {kPrt, kTsaiShih16, kTsaiShihPlain, kTsaiShihFull}) sum[method][kMultiple] = sum[kExact][kMultiple];
+    for (const Method method : {kPrt, kTsaiShih16, kTsaiShihPlain, kTsaiShihFull})
+      sum[method][kMultiple] = sum[kExact][kMultiple];
     return sum;
   }
 
  private:
-  void add_reference(const TileTrace::Vertex& hit, const Vec3& wo, const std::array<Vec3, kLights>& lights,
-                     RandomStream& random, double scale, MethodValues& sum) const {
+  void add_reference(const TileTrace::Vertex& hit, const Vec3& wo,
+                     const std::array<Vec3, kLights>& lights, RandomStream& random, double scale,
+                     MethodValues& sum) const {
     auto& parts = sum[kReference];
     walk_path(trace_, std::span<const BcsdfTable>(pack_.materials), hit, wo, Rgb(1, 1, 1), random,
               WalkLimits{},
-              [&](const TileTrace::Vertex& vertex, const Mat3& frame, const Vec3& out, const Rgb& throughput,
-                  int n) {
+              [&](const TileTrace::Vertex& vertex, const Mat3& frame, const Vec3& out,
+                  const Rgb& throughput, int n) {
                 const Vec3 local_out = frame.transpose() * out;
                 for (int l = 0; l < kLights; ++l) {
                   if (!shines(lights[l]) || !trace_.escapes(vertex, lights[l])) continue;
                   const Rgb value =
-                      throughput * scattered(vertex.material, frame.transpose() * lights[l], local_out);
+                      throughput *
+                      scattered(vertex.material, frame.transpose() * lights[l], local_out);
                   parts[n == 1 ? kSingle : kMultiple][l] += scale * value.cast<double>();
                   if (n > 1 && n <= 6) sum[kPath6][kMultiple][l] += scale * value.cast<double>();
                 }
@@ -223,17 +246,22 @@ class Swatch {
                               : model.directional(point, axis);
   }
 
-  void add_rivals(const TileTrace::Vertex& hit, const Vec3& wo, const std::array<Vec3, kLights>& towards, double scale,
-                  MethodValues& sum) const {
-    ShadingPoint point = {hit.segment, pack_.transfer->cell_of_segment[hit.segment], hit.material,
-                          {hit.tangent, hit.tangent}, {wo, wo}};
+  void add_rivals(const TileTrace::Vertex& hit, const Vec3& wo,
+                  const std::array<Vec3, kLights>& towards, double scale, MethodValues& sum) const {
+    ShadingPoint point = {hit.segment,
+                          pack_.transfer->cell_of_segment[hit.segment],
+                          hit.material,
+                          {hit.tangent, hit.tangent},
+                          {wo, wo}};
     for (int l = 0; l < kLights; ++l) {
       sum[kPrt][kSingle][l] += scale * single_of(prt_, point, l).cast<double>();
       sum[kTsaiShih16][kSingle][l] += scale * single_of(tsai_shih_16_, point, l).cast<double>();
-      sum[kTsaiShihPlain][kSingle][l] += scale * single_of(tsai_shih_plain_, point, l).cast<double>();
+      sum[kTsaiShihPlain][kSingle][l] +=
+          scale * single_of(tsai_shih_plain_, point, l).cast<double>();
       sum[kTsaiShihFull][kSingle][l] += scale * single_of(tsai_shih_full_, point, l).cast<double>();
       if (shines(towards[l])) {
-        const DualScattering::Parts parts = dual_.directional(point, hit.position, {towards[l], towards[l]});
+        const DualScattering::Parts parts =
+            dual_.directional(point, hit.position, {towards[l], towards[l]});
         sum[kDualScattering][kSingle][l] += scale * parts.single.cast<double>();
         sum[kDualScattering][kMultiple][l] += scale * parts.multiple.cast<double>();
       }
@@ -242,13 +270,16 @@ class Swatch {
     point.cell = printed_->transfer->cell_of_segment[hit.segment];
     for (int l = 0; l < kLights; ++l) {
       sum[kPrinted][kSingle][l] += scale * single_of(*printed_single_, point, l).cast<double>();
-      sum[kPrinted][kMultiple][l] +=
-          scale * printed_multiple_->radiance(printed_shape_, lights_[l], hit.segment, point.material, hit.tangent, wo).cast<double>();
+      sum[kPrinted][kMultiple][l] += scale * printed_multiple_
+                                                 ->radiance(printed_shape_, lights_[l], hit.segment,
+                                                            point.material, hit.tangent, wo)
+                                                 .cast<double>();
     }
   }
 
   Rgb scattered(std::uint16_t material, const Vec3& wi, const Vec3& wo) const {
-    return std::sqrt(std::max(0.0F, 1 - wi.x() * wi.x())) * pack_.materials[material].evaluate(wi, wo);
+    return std::sqrt(std::max(0.0F, 1 - wi.x() * wi.x())) *
+           pack_.materials[material].evaluate(wi, wo);
   }
 
   void add_precomputed(std::uint32_t segment, const Vec3& tangent, const Vec3& wo, double scale,
@@ -260,47 +291,53 @@ class Swatch {
                                 {wo, wo}};
     for (int l = 0; l < kLights; ++l) {
       parts[kSingle][l] += scale * single_of(single_, point, l).cast<double>();
-      parts[kMultiple][l] += scale * multiple_.radiance(shape_, lights_[l], segment, point.material, tangent, wo).cast<double>();
+      parts[kMultiple][l] +=
+          scale * multiple_.radiance(shape_, lights_[l], segment, point.material, tangent, wo)
+                      .cast<double>();
     }
   }
 
-  void add_origin_single(const TileTrace::Vertex& hit, const Vec3& wo, const std::array<Vec3, kLights>& lights,
-                         double scale, Values& sum) const {
+  void add_origin_single(const TileTrace::Vertex& hit, const Vec3& wo,
+                         const std::array<Vec3, kLights>& lights, double scale, Values& sum) const {
     const TileTrace::Vertex origin = trace_.at(origins_.position[hit.segment], hit.segment);
     const Mat3 frame = frame_about(hit.tangent);
     for (int l = 0; l < kLights; ++l) {
       if (!shines(lights[l]) || !trace_.escapes(origin, lights[l])) continue;
       sum[l] +=
-          scale * scattered(hit.material, frame.transpose() * lights[l], frame.transpose() * wo).cast<double>();
+          scale * scattered(hit.material, frame.transpose() * lights[l], frame.transpose() * wo)
+                      .cast<double>();
     }
   }
 
-  void add_floor_multiple(const TileTrace::Vertex& hit, const Vec3& wo, RandomStream& random, double scale,
-                          Values& sum) const {
+  void add_floor_multiple(const TileTrace::Vertex& hit, const Vec3& wo, RandomStream& random,
+                          double scale, Values& sum) const {
     const Vec3 towards = sample_sphere(random);
     const auto first = trace_.next(hit, towards);
     if (!first) return;
-    const auto escape = walk_path(
-        trace_, std::span<const BcsdfTable>(pack_.materials), *first, -towards, Rgb(1, 1, 1), random,
-        WalkLimits{}, [](const auto&, const Mat3&, const Vec3&, const Rgb&, int) { return true; });
+    const auto escape =
+        walk_path(trace_, std::span<const BcsdfTable>(pack_.materials), *first, -towards,
+                  Rgb(1, 1, 1), random, WalkLimits{},
+                  [](const auto&, const Mat3&, const Vec3&, const Rgb&, int) { return true; });
     if (!escape || (!pack_.transfer->both_sides && !(escape->direction.z() > 0))) return;
     const int order = pack_.transfer->order;
     const Vec3 local = wo_space(hit.tangent, wo) * towards;
     std::array<float, sh_count(kMaxShOrder)> harmonics;
     evaluate_sh(order, local, harmonics.data());
     IncomingField response;
-    pack_.materials[hit.material].sh_coefficients(std::asin(std::clamp(wo.dot(hit.tangent), -1.0F, 1.0F)),
-                                                  order, response.data());
+    pack_.materials[hit.material].sh_coefficients(
+        std::asin(std::clamp(wo.dot(hit.tangent), -1.0F, 1.0F)), order, response.data());
     Rgbd seen = Rgbd::Zero();
     for (int j = 0; j < sh_count(order); ++j) {
-      for (int c = 0; c < 3; ++c) seen[c] += static_cast<double>(harmonics[j]) * response[3 * j + c];
+      for (int c = 0; c < 3; ++c)
+        seen[c] += static_cast<double>(harmonics[j]) * response[3 * j + c];
     }
     const Rgbd carried = 4 * kPi * scale * escape->throughput.cast<double>() * seen;
     std::array<float, sh_count(kMaxShOrder)> light_harmonics;
     evaluate_sh(order, escape->direction, light_harmonics.data());
     for (int l = 0; l < kLights; ++l) {
       double kernel = 0;
-      for (int j = 0; j < sh_count(order); ++j) kernel += static_cast<double>(light_harmonics[j]) * projected_[l][j];
+      for (int j = 0; j < sh_count(order); ++j)
+        kernel += static_cast<double>(light_harmonics[j]) * projected_[l][j];
       sum[l] += kernel * carried;
     }
   }
@@ -334,8 +371,8 @@ double value(const MethodValues& values, int method, int part, int light, int ch
   return parts[kSingle][light][channel] + parts[kMultiple][light][channel];
 }
 
-/// Sum over all pairs (and all channels, where channel < 0) of `term(view, light, channel)`, over their
-/// number.
+/// Sum over all pairs (and all channels, where channel < 0) of `term(view, light, channel)`, over
+/// their number.
 template <class Term>
 double mean_over(int channel, Term&& term) {
   double sum = 0;
@@ -373,22 +410,23 @@ Comparison compare(const std::array<Half, 2>& halves, int method, int part, int 
 void print_report(const FabricPack& pack, const Swatch& swatch, const Options& options,
                   const std::array<Half, 2>& halves) {
   const double noise = std::sqrt(mean_over(-1, [&](int v, int l, int c) {
-    const double d =
-        value(halves[0][v], kReference, kTotal, l, c) - value(halves[1][v], kReference, kTotal, l, c);
+    const double d = value(halves[0][v], kReference, kTotal, l, c) -
+                     value(halves[1][v], kReference, kTotal, l, c);
     return 0.25 * d * d;
   }));
   const double total = compare(halves, kReference, kTotal, -1).reference;
   fmt::print("{}: {} segments, SH order {}, {} cells; {} views x {} lights, {} eye rays per view\n",
-             pack.name, pack.exemplar.segment_count(), pack.transfer->order, pack.transfer->cell_count(),
-             kViews, kLights, options.paths);
-  fmt::print("mean reference radiance {:.5f}; its standard error, rms over values: {:.2f} %\n\n", total,
-             100 * noise / total);
-  fmt::print("{:<16}{:<10}{:>12}{:>14}{:>16}{:>26}\n", "method", "part", "mean ratio", "RMSE of part",
-             "RMSE of total", "RMSE of part, r / g / b");
+             pack.name, pack.exemplar.segment_count(), pack.transfer->order,
+             pack.transfer->cell_count(), kViews, kLights, options.paths);
+  fmt::print("mean reference radiance {:.5f}; its standard error, rms over values: {:.2f} %\n\n",
+             total, 100 * noise / total);
+  fmt::print("{:<16}{:<10}{:>12}{:>14}{:>16}{:>26}\n", "method", "part", "mean ratio",
+             "RMSE of part", "RMSE of total", "RMSE of part, r / g / b");
   for (int m = kExact; m < kMethods; ++m) {
     if (!swatch.has(m)) continue;
     for (int p = 0; p < kParts; ++p) {
-      const bool multiple_of_exact = m == kOrigin || m == kPrt || (m >= kTsaiShih16 && m <= kTsaiShihFull);
+      const bool multiple_of_exact =
+          m == kOrigin || m == kPrt || (m >= kTsaiShih16 && m <= kTsaiShihFull);
       const bool single_of_reference = m == kFloor || m == kPath6;
       if ((multiple_of_exact && p == kMultiple) || (single_of_reference && p == kSingle)) continue;
       const Comparison all = compare(halves, m, p, -1);
@@ -412,8 +450,8 @@ void write_csv(const std::string& path, const Swatch& swatch, const std::array<H
         if (!swatch.has(m)) continue;
         for (int p = 0; p < kTotal; ++p) {
           for (int h = 0; h < 2; ++h) {
-            file << fmt::format("{},{},{},{},{},{},{:.7g},{:.7g},{:.7g}\n", view_degrees(v), light_theta(l),
-                                light_azimuth(l), kMethodNames[m], kPartNames[p], h,
+            file << fmt::format("{},{},{},{},{},{},{:.7g},{:.7g},{:.7g}\n", view_degrees(v),
+                                light_theta(l), light_azimuth(l), kMethodNames[m], kPartNames[p], h,
                                 value(halves[h][v], m, p, l, 0), value(halves[h][v], m, p, l, 1),
                                 value(halves[h][v], m, p, l, 2));
           }
@@ -425,7 +463,8 @@ void write_csv(const std::string& path, const Swatch& swatch, const std::array<H
 }
 
 /// One panel per light: mean of the channels over theta_o, total and single scattering.
-void write_svg(const std::string& path, const std::string& title, const std::array<Half, 2>& halves) {
+void write_svg(const std::string& path, const std::string& title,
+               const std::array<Half, 2>& halves) {
   constexpr int kPanelWidth = 320;
   constexpr int kPanelHeight = 220;
   constexpr int kMargin = 40;
@@ -455,12 +494,15 @@ void write_svg(const std::string& path, const std::string& title, const std::arr
   }
   std::ofstream file(path);
   file << fmt::format(
-      "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{}\" height=\"{}\" font-family=\"sans-serif\" "
+      "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{}\" height=\"{}\" "
+      "font-family=\"sans-serif\" "
       "font-size=\"11\">\n"
       "<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n"
-      "<text x=\"{}\" y=\"16\" font-size=\"14\">{}: radiance over view angle; solid: total, dashed: single "
+      "<text x=\"{}\" y=\"16\" font-size=\"14\">{}: radiance over view angle; solid: total, "
+      "dashed: single "
       "scattering</text>\n",
-      kColumns * kPanelWidth + kMargin, kLights / kColumns * kPanelHeight + 3 * kMargin / 2, kMargin, title);
+      kColumns * kPanelWidth + kMargin, kLights / kColumns * kPanelHeight + 3 * kMargin / 2,
+      kMargin, title);
   double x = kMargin;
   for (const Curve& curve : kCurves) {
     file << fmt::format("<text x=\"{}\" y=\"32\" fill=\"{}\">{}</text>\n", x, curve.colour,
@@ -483,8 +525,9 @@ void write_svg(const std::string& path, const std::string& title, const std::arr
         left + width, bottom + 12);
     for (const Curve& curve : kCurves) {
       for (const Part part : {kTotal, kSingle}) {
-        file << fmt::format("<polyline fill=\"none\" stroke=\"{}\" stroke-width=\"1.3\"{} points=\"",
-                            curve.colour, part == kSingle ? " stroke-dasharray=\"4 3\"" : "");
+        file << fmt::format(
+            "<polyline fill=\"none\" stroke=\"{}\" stroke-width=\"1.3\"{} points=\"", curve.colour,
+            part == kSingle ? " stroke-dasharray=\"4 3\"" : "");
         for (int v = 0; v < kViews; ++v) {
           file << fmt::format("{:.1f},{:.1f} ", left + width * v / (kViews - 1),
                               bottom - height * grey(curve.method, part, v, l) / top);
@@ -505,10 +548,12 @@ void run(const Options& options) {
   std::optional<FabricPack> printed;
   if (!options.printed.empty()) {
     printed = load_pack(options.printed);
-    if (!printed->ssdf || !printed->transfer) throw FileError(options.printed + ": needs an SSDF and a transfer");
+    if (!printed->ssdf || !printed->transfer)
+      throw FileError(options.printed + ": needs an SSDF and a transfer");
   }
   const bool soft = options.sharpness && *options.sharpness < VisibilityBlend{}.to;
-  if (soft && (!pack.sgs || (printed && !printed->sgs))) throw FileError("a pack lacks sums of Gaussians");
+  if (soft && (!pack.sgs || (printed && !printed->sgs)))
+    throw FileError("a pack lacks sums of Gaussians");
   const Swatch swatch(pack, printed ? &*printed : nullptr, options);
   std::array<Half, 2> halves = {Half(kViews), Half(kViews)};
   tbb::parallel_for(0, 2 * kViews, [&](int i) {
@@ -526,8 +571,10 @@ int main(int argc, char** argv) {
   heddle::Options options;
   CLI::App app("Radiance of a flat swatch: precomputed methods against path tracing.");
   app.add_option("pack", options.pack, "fabric pack with SSDF, transfer and volume")->required();
-  app.add_option("--printed", options.printed, "pack of the same fabric, baked for the method `printed`");
-  app.add_option("--sharpness", options.sharpness, "spherical Gaussians in place of directional lights")
+  app.add_option("--printed", options.printed,
+                 "pack of the same fabric, baked for the method `printed`");
+  app.add_option("--sharpness", options.sharpness,
+                 "spherical Gaussians in place of directional lights")
       ->check(CLI::NonNegativeNumber);
   app.add_flag("!--no-rivals", options.rivals, "exact, volume, origin and floor only");
   app.add_option("--paths", options.paths, "eye rays per view, both halves together")

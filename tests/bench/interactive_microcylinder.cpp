@@ -1,12 +1,16 @@
-// The interactive microcylinder (render/surface/interactive_microcylinder.h) against its ray-traced reference on a drape.
+// The interactive microcylinder (render/surface/interactive_microcylinder.h) against its ray-traced
+// reference on a drape.
 //
-//   heddle_interactive_microcylinder CLOTH.obj [--fabric NAME] [--environment MAP.hdr] [--lights 10] [--out PREFIX]
+//   heddle_interactive_microcylinder CLOTH.obj [--fabric NAME] [--environment MAP.hdr] [--lights
+//     10] [--out PREFIX]
 //
-// Prints what the precomputation costs and weighs, the error at visible vertices of the method as printed and of ours, the
-// directions per light with which ray tracing has the same error, and frames per second at 640 x 480 of both: all vertices
-// that face the camera are shaded and interpolated over their triangles. The mesh is in metres and needs UVs and normals.
-// Then figure 8 of Iwasaki et al. 2014: the shadow of a handle and a spout on a plane under an anisotropic light, by the
-// line through the nearest border, by an isotropic Gaussian of the same area, and ray traced. --out writes pictures of both.
+// Prints what the precomputation costs and weighs, the error at visible vertices of the method as
+// printed and of ours, the directions per light with which ray tracing has the same error, and
+// frames per second at 640 x 480 of both: all vertices that face the camera are shaded and
+// interpolated over their triangles. The mesh is in metres and needs UVs and normals. Then figure 8
+// of Iwasaki et al. 2014: the shadow of a handle and a spout on a plane under an anisotropic light,
+// by the line through the nearest border, by an isotropic Gaussian of the same area, and ray
+// traced. --out writes pictures of both.
 
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
@@ -51,9 +55,11 @@ struct Cloth {
 
 Cloth read_cloth(const std::string& path) {
   const ObjMesh obj = read_obj(path);
-  if (obj.uvs.empty() || obj.normals.empty()) throw FileError(path + ": the mesh needs UVs and normals");
+  if (obj.uvs.empty() || obj.normals.empty())
+    throw FileError(path + ": the mesh needs UVs and normals");
   Cloth cloth;
-  for (const auto& p : obj.positions) cloth.mesh.positions.push_back(1000.0F * Vec3(p[0], p[1], p[2]));
+  for (const auto& p : obj.positions)
+    cloth.mesh.positions.push_back(1000.0F * Vec3(p[0], p[1], p[2]));
   cloth.mesh.triangles = obj.triangles;
   std::vector<Vec3> along_u(obj.positions.size(), Vec3::Zero());
   for (const auto& t : obj.triangles) {
@@ -84,7 +90,8 @@ class Rasterizer {
   static constexpr int kWidth = 640;
   static constexpr int kHeight = 480;
 
-  explicit Rasterizer(const Cloth& cloth, const Vec3d& eye, const Vec3d& target) : cloth_(cloth), eye_(eye) {
+  explicit Rasterizer(const Cloth& cloth, const Vec3d& eye, const Vec3d& target)
+      : cloth_(cloth), eye_(eye) {
     const Vec3d forward = (target - eye).normalized();
     const Vec3d right = forward.cross(Vec3d(0, 0, 1)).normalized();
     const Vec3d up = right.cross(forward);
@@ -92,8 +99,8 @@ class Rasterizer {
     for (const Vec3& p : cloth.mesh.positions) {
       const Vec3d d = p.cast<double>() - eye;
       const double depth = d.dot(forward);
-      projected_.emplace_back(kWidth / 2.0 + focal * d.dot(right) / depth, kHeight / 2.0 - focal * d.dot(up) / depth,
-                              depth);
+      projected_.emplace_back(kWidth / 2.0 + focal * d.dot(right) / depth,
+                              kHeight / 2.0 - focal * d.dot(up) / depth, depth);
     }
   }
 
@@ -110,9 +117,11 @@ class Rasterizer {
       const Vec3d& c = projected_[t[2]];
       const double area = (b - a).x() * (c - a).y() - (b - a).y() * (c - a).x();
       const int x0 = std::max(0, static_cast<int>(std::floor(std::min({a.x(), b.x(), c.x()}))));
-      const int x1 = std::min(kWidth - 1, static_cast<int>(std::ceil(std::max({a.x(), b.x(), c.x()}))));
+      const int x1 =
+          std::min(kWidth - 1, static_cast<int>(std::ceil(std::max({a.x(), b.x(), c.x()}))));
       const int y0 = std::max(0, static_cast<int>(std::floor(std::min({a.y(), b.y(), c.y()}))));
-      const int y1 = std::min(kHeight - 1, static_cast<int>(std::ceil(std::max({a.y(), b.y(), c.y()}))));
+      const int y1 =
+          std::min(kHeight - 1, static_cast<int>(std::ceil(std::max({a.y(), b.y(), c.y()}))));
       if (area == 0) continue;
       for (int y = y0; y <= y1; ++y) {
         for (int x = x0; x <= x1; ++x) {
@@ -139,7 +148,8 @@ class Rasterizer {
   std::vector<Vec3d> projected_;  // x, y in pixels, depth in mm
 };
 
-void write_picture(const std::string& path, int width, int height, const std::vector<Rgb>& pixels, float scale) {
+void write_picture(const std::string& path, int width, int height, const std::vector<Rgb>& pixels,
+                   float scale) {
   std::vector<std::uint8_t> bytes;
   for (const Rgb& pixel : pixels) {
     for (int c = 0; c < 3; ++c) {
@@ -156,7 +166,8 @@ std::vector<Light> default_lights(int count) {
     RandomStream random(1, RandomStage::kBench, 0, static_cast<std::uint64_t>(k));
     const Vec3 axis = sample_hemisphere(Vec3(0, 0, 1), random);
     const float sharpness = 4 * std::exp2(8 * random.uniform());
-    lights.push_back({LightType::kSphericalGaussian, axis, sharpness, Rgb::Constant(2 * random.uniform())});
+    lights.push_back(
+        {LightType::kSphericalGaussian, axis, sharpness, Rgb::Constant(2 * random.uniform())});
   }
   return lights;
 }
@@ -180,9 +191,10 @@ void compare_drape(const Options& options) {
   std::vector<Light> lights = default_lights(options.lights);
   if (!options.environment.empty()) {
     const Clock::time_point start = Clock::now();
-    const EnvironmentSgs fit = fit_environment_sgs(EnvironmentMap::read(options.environment), options.lights);
-    fmt::print("environment: {} Gaussians, relative error {:.4f}, {:.2f} s\n", options.lights, fit.relative_error,
-               seconds_since(start));
+    const EnvironmentSgs fit =
+        fit_environment_sgs(EnvironmentMap::read(options.environment), options.lights);
+    fmt::print("environment: {} Gaussians, relative error {:.4f}, {:.2f} s\n", options.lights,
+               fit.relative_error, seconds_since(start));
     lights = fit.lights;
   }
 
@@ -193,11 +205,13 @@ void compare_drape(const Options& options) {
   };
   Clock::time_point start = Clock::now();
   const DistanceMaps maps(cloth.frames, visible_from, {});
-  fmt::print("distance maps: {} vertices, {:.2f} s, {:.2f} MB, compression error {:.2f} degrees\n", cloth.frames.size(),
-             seconds_since(start), static_cast<double>(maps.bytes()) / 1e6, degrees(maps.compression_error()));
+  fmt::print("distance maps: {} vertices, {:.2f} s, {:.2f} MB, compression error {:.2f} degrees\n",
+             cloth.frames.size(), seconds_since(start), static_cast<double>(maps.bytes()) / 1e6,
+             degrees(maps.compression_error()));
 
   Vec3d middle = Vec3d::Zero();
-  for (const Vec3& p : cloth.mesh.positions) middle += p.cast<double>() / static_cast<double>(cloth.frames.size());
+  for (const Vec3& p : cloth.mesh.positions)
+    middle += p.cast<double>() / static_cast<double>(cloth.frames.size());
   const Rasterizer rasterizer(cloth, middle + Vec3d(260, -340, 190), middle);
   std::vector<std::uint32_t> facing;
   for (std::uint32_t v = 0; v < cloth.frames.size(); ++v) {
@@ -210,13 +224,15 @@ void compare_drape(const Options& options) {
   InteractiveSettings settings;
   const InteractiveMicrocylinder model(fabric, settings);
   const auto traced_at = [&](std::uint32_t v, int strata) {
-    return ray_traced_radiance([&](const Vec3d& wi, const Vec3d& wo) { return model.reflected(wi, wo); },
-                               cloth.frames[v].cast<double>(), rasterizer.to_eye(v), lights,
-                               [&](const Vec3& direction) { return visible_from(v, direction); }, strata);
+    return ray_traced_radiance(
+        [&](const Vec3d& wi, const Vec3d& wo) { return model.reflected(wi, wo); },
+        cloth.frames[v].cast<double>(), rasterizer.to_eye(v), lights,
+        [&](const Vec3& direction) { return visible_from(v, direction); }, strata);
   };
   const auto traced = [&](int strata) {
     std::vector<Rgbd> result(probes.size());
-    tbb::parallel_for(std::size_t{0}, probes.size(), [&](std::size_t k) { result[k] = traced_at(probes[k], strata); });
+    tbb::parallel_for(std::size_t{0}, probes.size(),
+                      [&](std::size_t k) { result[k] = traced_at(probes[k], strata); });
     return result;
   };
   const std::vector<Rgbd> reference = traced(options.strata);
@@ -229,8 +245,8 @@ void compare_drape(const Options& options) {
     const InteractiveMicrocylinder interactive(fabric, settings);
     const double build = seconds_since(start);
     const auto shaded_at = [&](std::uint32_t v) {
-      const auto shade =
-          form == Form::kOurs ? &InteractiveMicrocylinder::shade : &InteractiveMicrocylinder::shade_in_double;
+      const auto shade = form == Form::kOurs ? &InteractiveMicrocylinder::shade
+                                             : &InteractiveMicrocylinder::shade_in_double;
       return (interactive.*shade)(cloth.frames[v].cast<double>(), rasterizer.to_eye(v), lights,
                                   {&maps, maps.coefficients(v)});
     };
@@ -247,37 +263,43 @@ void compare_drape(const Options& options) {
     }
     const double per_frame = seconds_since(start) / kFrames;
     const double error = rms(at_probes, reference);
-    fmt::print("{}: {} tangents, tables {:.2f} s, {:.2f} MB; error {:.4f}; {:.2f} frames/s ({} vertices, {} lights)\n",
-               form == Form::kPrinted ? "as printed" : (form == Form::kInDouble ? "ours, in double" : "ours"),
-               interactive.tangents().size(), build, static_cast<double>(interactive.table().bytes()) / 1e6, error,
-               1 / per_frame, facing.size(), lights.size());
+    fmt::print(
+        "{}: {} tangents, tables {:.2f} s, {:.2f} MB; error {:.4f}; {:.2f} frames/s ({} vertices, "
+        "{} lights)\n",
+        form == Form::kPrinted ? "as printed"
+                               : (form == Form::kInDouble ? "ours, in double" : "ours"),
+        interactive.tangents().size(), build,
+        static_cast<double>(interactive.table().bytes()) / 1e6, error, 1 / per_frame, facing.size(),
+        lights.size());
     if (form == Form::kOurs) {
       error_of_ours = error;
       if (!options.out.empty()) {
         float brightest = 0;
         for (const Rgb& pixel : pixels) brightest = std::max(brightest, pixel.maxCoeff());
-        write_picture(options.out + "-ours.png", Rasterizer::kWidth, Rasterizer::kHeight, pixels, 1.2F / brightest);
+        write_picture(options.out + "-ours.png", Rasterizer::kWidth, Rasterizer::kHeight, pixels,
+                      1.2F / brightest);
         std::vector<Rgbd> truth(cloth.frames.size(), Rgbd::Zero());
         tbb::parallel_for(std::size_t{0}, facing.size(),
                           [&](std::size_t k) { truth[facing[k]] = traced_at(facing[k], 8); });
-        write_picture(options.out + "-traced.png", Rasterizer::kWidth, Rasterizer::kHeight, rasterizer.draw(truth),
-                      1.2F / brightest);
+        write_picture(options.out + "-traced.png", Rasterizer::kWidth, Rasterizer::kHeight,
+                      rasterizer.draw(truth), 1.2F / brightest);
       }
     }
   }
   for (const int strata : {1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20}) {
     start = Clock::now();
     const std::vector<Rgbd> result = traced(strata);
-    const double per_frame =
-        seconds_since(start) * static_cast<double>(facing.size()) / static_cast<double>(probes.size());
+    const double per_frame = seconds_since(start) * static_cast<double>(facing.size()) /
+                             static_cast<double>(probes.size());
     const double error = rms(result, reference);
-    fmt::print("ray traced, {:2} x {:2} directions per light: error {:.4f}; {:.3f} frames/s\n", strata, strata, error,
-               1 / per_frame);
+    fmt::print("ray traced, {:2} x {:2} directions per light: error {:.4f}; {:.3f} frames/s\n",
+               strata, strata, error, 1 / per_frame);
     if (error < error_of_ours) break;
   }
 }
 
-// exp(-lambda (w.x)^2 - mu (w.y)^2) max(w.z, 0) about a steep axis z, over a plane under a ball with a ring and a cone.
+// exp(-lambda (w.x)^2 - mu (w.y)^2) max(w.z, 0) about a steep axis z, over a plane under a ball
+// with a ring and a cone.
 struct AnisotropicLight {
   Vec3d x, y, z;
   double lambda, mu;
@@ -305,15 +327,18 @@ TriangleMesh handle_and_spout() {
   constexpr float kTurn = 2 * kPif;
   grid(24, 48, [](float u, float v) {  // the body
     const float radius = 11 * std::sin(kPif * u);
-    return Vec3(radius * std::cos(kTurn * v), radius * std::sin(kTurn * v), 12 + 11 * std::cos(kPif * u));
+    return Vec3(radius * std::cos(kTurn * v), radius * std::sin(kTurn * v),
+                12 + 11 * std::cos(kPif * u));
   });
   grid(48, 12, [](float u, float v) {  // an upright ring
     const float radius = 8 + 1.2F * std::cos(kTurn * v);
-    return Vec3(-14 + radius * std::cos(kTurn * u), 1.2F * std::sin(kTurn * v), 12 + radius * std::sin(kTurn * u));
+    return Vec3(-14 + radius * std::cos(kTurn * u), 1.2F * std::sin(kTurn * v),
+                12 + radius * std::sin(kTurn * u));
   });
   grid(16, 12, [](float u, float v) {  // a leaning cone
     const float radius = 2.5F - 2 * u;
-    return Vec3(8 + 16 * u + radius * std::cos(kTurn * v), radius * std::sin(kTurn * v), 2 + 18 * u);
+    return Vec3(8 + 16 * u + radius * std::cos(kTurn * v), radius * std::sin(kTurn * v),
+                2 + 18 * u);
   });
   return mesh;
 }
@@ -325,17 +350,20 @@ void compare_anisotropic(const Options& options) {
   std::vector<Mat3> frames;
   for (int row = 0; row < kSide; ++row) {
     for (int column = 0; column < kSide; ++column) {
-      points.emplace_back(static_cast<float>(column) + 0.5F - kSide / 2, kSide / 2 - 0.5F - static_cast<float>(row), 0);
+      points.emplace_back(static_cast<float>(column) + 0.5F - kSide / 2,
+                          kSide / 2 - 0.5F - static_cast<float>(row), 0);
       frames.push_back(Mat3::Identity());
     }
   }
   DistanceMapSettings map_settings;
   map_settings.resolution = 128;
   const DistanceMaps maps(
-      frames, [&](std::uint32_t v, const Vec3& direction) { return !scene.occluded(points[v], direction); },
+      frames,
+      [&](std::uint32_t v, const Vec3& direction) { return !scene.occluded(points[v], direction); },
       map_settings);
   fmt::print(
-      "\nanisotropic light (figure 8): shadow of a ball, a ring and a cone, {} terms, compression error {:.2f} "
+      "\nanisotropic light (figure 8): shadow of a ball, a ring and a cone, {} terms, compression "
+      "error {:.2f} "
       "degrees\n",
       map_settings.terms, degrees(maps.compression_error()));
   std::vector<Rgb> montage(static_cast<std::size_t>(3 * kSide * 2 * kSide), Rgb::Zero());
@@ -369,9 +397,11 @@ void compare_anisotropic(const Options& options) {
           if (!scene.occluded(points[k], w.cast<float>())) seen += value;
         }
       }
-      const SignedDistance at = maps.evaluate(maps.coefficients(static_cast<std::uint32_t>(k)), light.z);
+      const SignedDistance at =
+          maps.evaluate(maps.coefficients(static_cast<std::uint32_t>(k)), light.z);
       const VisibilityLine line = visibility_line(at, 1, light.x, light.y);
-      shadow[k] = {seen / whole, visible_share(width_x, width_y, line), 0.5 * (1 + std::erf(at.distance / isotropic))};
+      shadow[k] = {seen / whole, visible_share(width_x, width_y, line),
+                   0.5 * (1 + std::erf(at.distance / isotropic))};
     });
     double line_error = 0;
     double isotropic_error = 0;
@@ -380,14 +410,18 @@ void compare_anisotropic(const Options& options) {
       isotropic_error += std::pow(shadow[k][2] - shadow[k][0], 2);
       for (std::size_t m = 0; m < 3; ++m) {
         const std::size_t row = static_cast<std::size_t>(turn) * kSide + k / kSide;
-        montage[(row * 3 + m) * kSide + k % kSide] = Rgb::Constant(static_cast<float>(shadow[k][m]));
+        montage[(row * 3 + m) * kSide + k % kSide] =
+            Rgb::Constant(static_cast<float>(shadow[k][m]));
       }
     }
     const auto count = static_cast<double>(shadow.size());
-    fmt::print("  (lambda, mu) = ({}, {}): RMS error of the visible share: line {:.4f}, isotropic {:.4f}\n",
-               light.lambda, light.mu, std::sqrt(line_error / count), std::sqrt(isotropic_error / count));
+    fmt::print(
+        "  (lambda, mu) = ({}, {}): RMS error of the visible share: line {:.4f}, isotropic "
+        "{:.4f}\n",
+        light.lambda, light.mu, std::sqrt(line_error / count), std::sqrt(isotropic_error / count));
   }
-  if (!options.out.empty()) write_picture(options.out + "-anisotropic.png", 3 * kSide, 2 * kSide, montage, 1);
+  if (!options.out.empty())
+    write_picture(options.out + "-anisotropic.png", 3 * kSide, 2 * kSide, montage, 1);
 }
 
 }  // namespace

@@ -1,7 +1,8 @@
-// The error curves of every known failure (docs/stability.md) as one CSV and one sheet of curves, the limit from which the
-// program warns drawn in.
+// The error curves of every known failure (docs/stability.md) as one CSV and one sheet of curves,
+// the limit from which the program warns drawn in.
 //
-//   heddle_stability [NAME ...] [--quick] [--out PREFIX]     PREFIX.csv and PREFIX.svg; a few minutes of one core
+//   heddle_stability [NAME ...] [--quick] [--out PREFIX]     PREFIX.csv and PREFIX.svg; a few
+//                                                            minutes of one core
 
 #include <fmt/format.h>
 
@@ -41,8 +42,9 @@ void write_csv(std::ostream& out, const std::vector<Measured>& curves) {
   for (const auto& [name, curve] : curves) {
     for (const Series& series : curve.series) {
       for (std::size_t k = 0; k < curve.drivers.size(); ++k) {
-        out << fmt::format("{},\"{}\",{:.6g},\"{}\",{:.6g},{}\n", name, curve.driver, curve.drivers[k], series.name,
-                           series.values[k], curve.warning_from ? fmt::format("{:g}", *curve.warning_from) : "");
+        out << fmt::format("{},\"{}\",{:.6g},\"{}\",{:.6g},{}\n", name, curve.driver,
+                           curve.drivers[k], series.name, series.values[k],
+                           curve.warning_from ? fmt::format("{:g}", *curve.warning_from) : "");
       }
     }
   }
@@ -58,7 +60,8 @@ struct Axes {
     return left + width * ((is_log ? std::log10(driver) : driver) - first) / (last - first);
   }
   double y(double value) const {
-    return bottom - height * (std::clamp(std::log10(std::max(value, 1e-30)), low, high) - low) / (high - low);
+    return bottom - height * (std::clamp(std::log10(std::max(value, 1e-30)), low, high) - low) /
+                        (high - low);
   }
 };
 
@@ -95,57 +98,65 @@ void draw(std::ostream& out, const Measured& measured, double left, double top) 
   const Axes axes = axes_of(curve, left, top);
   const double right = axes.left + axes.width;
   const double upper = axes.bottom - axes.height;
-  out << fmt::format("<text x=\"{:.0f}\" y=\"{:.0f}\" font-size=\"13\" font-weight=\"bold\">{}</text>\n", left + 8,
-                     top + 18, xml_text(curve.title));
+  out << fmt::format(
+      "<text x=\"{:.0f}\" y=\"{:.0f}\" font-size=\"13\" font-weight=\"bold\">{}</text>\n", left + 8,
+      top + 18, xml_text(curve.title));
   double x = left + 8;
   for (std::size_t s = 0; s < curve.series.size(); ++s) {
-    out << fmt::format("<text x=\"{:.0f}\" y=\"{:.0f}\" fill=\"{}\">{}</text>\n", x, top + 34, kColors[s],
-                       xml_text(curve.series[s].name));
+    out << fmt::format("<text x=\"{:.0f}\" y=\"{:.0f}\" fill=\"{}\">{}</text>\n", x, top + 34,
+                       kColors[s], xml_text(curve.series[s].name));
     x += 14 + 5.6 * static_cast<double>(curve.series[s].name.size());
   }
-  out << fmt::format("<text x=\"{:.0f}\" y=\"{:.0f}\" fill=\"#555555\">{}</text>\n", left + 8, top + 50,
-                     xml_text(curve.measure));
+  out << fmt::format("<text x=\"{:.0f}\" y=\"{:.0f}\" fill=\"#555555\">{}</text>\n", left + 8,
+                     top + 50, xml_text(curve.measure));
   if (curve.warning_from) {
     const double at = axes.x(*curve.warning_from);
     const double to = curve.warning_to ? axes.x(*curve.warning_to) : right;
-    out << fmt::format("<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" fill=\"#fff0c8\"/>\n",
-                       curve.warns_above ? at : axes.left, upper, curve.warns_above ? to - at : at - axes.left,
-                       axes.height);
+    out << fmt::format(
+        "<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" fill=\"#fff0c8\"/>\n",
+        curve.warns_above ? at : axes.left, upper, curve.warns_above ? to - at : at - axes.left,
+        axes.height);
     out << fmt::format(
         "<line x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"{1:.1f}\" y2=\"{2:.1f}\" stroke=\"#b07000\" "
         "stroke-dasharray=\"4 3\"/>\n",
         at, upper, axes.bottom);
   }
   const int step = axes.high - axes.low > 6 ? 4 : 1;
-  for (int decade = static_cast<int>(axes.high); decade >= static_cast<int>(axes.low); decade -= step) {
+  for (int decade = static_cast<int>(axes.high); decade >= static_cast<int>(axes.low);
+       decade -= step) {
     const double y = axes.y(std::pow(10.0, decade));
-    out << fmt::format("<line x1=\"{:.1f}\" x2=\"{:.1f}\" y1=\"{:.1f}\" y2=\"{:.1f}\" stroke=\"#dddddd\"/>\n",
-                       axes.left, right, y, y);
     out << fmt::format(
-        "<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"end\">{}</text>\n", axes.left - 4, y + 4,
-        decade >= -3 ? fmt::format("{:g} %", 100 * std::pow(10.0, decade)) : fmt::format("1e{}", decade));
+        "<line x1=\"{:.1f}\" x2=\"{:.1f}\" y1=\"{:.1f}\" y2=\"{:.1f}\" stroke=\"#dddddd\"/>\n",
+        axes.left, right, y, y);
+    out << fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"end\">{}</text>\n",
+                       axes.left - 4, y + 4,
+                       decade >= -3 ? fmt::format("{:g} %", 100 * std::pow(10.0, decade))
+                                    : fmt::format("1e{}", decade));
   }
   out << fmt::format(
-      "<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" fill=\"none\" stroke=\"#999999\"/>\n",
+      "<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" fill=\"none\" "
+      "stroke=\"#999999\"/>\n",
       axes.left, upper, axes.width, axes.height);
   for (const double share : {0.0, 0.25, 0.5, 0.75, 1.0}) {
     const double at = axes.first + share * (axes.last - axes.first);
     out << fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\">{:.3g}</text>\n",
-                       axes.left + share * axes.width, axes.bottom + 14, curve.is_log ? std::pow(10.0, at) : at);
+                       axes.left + share * axes.width, axes.bottom + 14,
+                       curve.is_log ? std::pow(10.0, at) : at);
   }
-  out << fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\">{}</text>\n", axes.left + 0.5 * axes.width,
-                     axes.bottom + 30, xml_text(curve.driver));
+  out << fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\">{}</text>\n",
+                     axes.left + 0.5 * axes.width, axes.bottom + 30, xml_text(curve.driver));
   for (std::size_t s = 0; s < curve.series.size(); ++s) {
     std::vector<std::pair<double, double>> points;
     for (std::size_t k = 0; k < curve.drivers.size(); ++k)
       points.emplace_back(curve.drivers[k], curve.series[s].values[k]);
     std::sort(points.begin(), points.end());
     out << "<polyline fill=\"none\" stroke=\"" << kColors[s] << "\" stroke-width=\"1.6\" points=\"";
-    for (const auto& [driver, value] : points) out << fmt::format("{:.1f},{:.1f} ", axes.x(driver), axes.y(value));
+    for (const auto& [driver, value] : points)
+      out << fmt::format("{:.1f},{:.1f} ", axes.x(driver), axes.y(value));
     out << "\"/>\n";
     for (const auto& [driver, value] : points) {
-      out << fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"2.4\" fill=\"{}\"/>\n", axes.x(driver), axes.y(value),
-                         kColors[s]);
+      out << fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"2.4\" fill=\"{}\"/>\n",
+                         axes.x(driver), axes.y(value), kColors[s]);
     }
   }
 }
@@ -153,7 +164,8 @@ void draw(std::ostream& out, const Measured& measured, double left, double top) 
 void write_svg(std::ostream& out, const std::vector<Measured>& curves) {
   const std::size_t rows = (curves.size() + kColumns - 1) / kColumns;
   out << fmt::format(
-      "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{:.0f}\" height=\"{:.0f}\" font-family=\"sans-serif\" "
+      "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{:.0f}\" height=\"{:.0f}\" "
+      "font-family=\"sans-serif\" "
       "font-size=\"10.5\">\n<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n",
       kColumns * kPanelWidth, static_cast<double>(rows) * kPanelHeight);
   for (std::size_t k = 0; k < curves.size(); ++k) {
@@ -170,7 +182,8 @@ void run(const std::vector<std::string>& names, Effort effort, const std::string
     curves.push_back({one.name, one.measure(effort)});
     std::cerr << one.name << '\n';
   }
-  for (const auto& [suffix, write] : {std::pair{".csv", &write_csv}, std::pair{".svg", &write_svg}}) {
+  for (const auto& [suffix, write] :
+       {std::pair{".csv", &write_csv}, std::pair{".svg", &write_svg}}) {
     std::ofstream file(prefix + suffix);
     write(file, curves);
     if (!file.flush()) throw FileError("cannot write " + prefix + suffix);
@@ -188,7 +201,8 @@ int main(int argc, char** argv) {
   CLI::App app("Error curves of every known failure.");
   std::vector<std::string> known;
   for (const auto& curve : heddle::stability::all_curves()) known.emplace_back(curve.name);
-  app.add_option("curve", names, "names of docs/stability.md; all of them where absent")->check(CLI::IsMember(known));
+  app.add_option("curve", names, "names of docs/stability.md; all of them where absent")
+      ->check(CLI::IsMember(known));
   app.add_flag("--quick", quick, "the few points that the tests use");
   app.add_option("--out", prefix, "prefix of the .csv and .svg files");
   CLI11_PARSE(app, argc, argv);

@@ -1,7 +1,8 @@
-// One page of pictures of all surface fabrics: the first view of a scene, drawn once for each preset in place of the scene's own
-// surfaces, side by side with their names.
+// One page of pictures of all surface fabrics: the first view of a scene, drawn once for each
+// preset in place of the scene's own surfaces, side by side with their names.
 //
-//   heddle_surface_gallery configs/scenes/surface-gallery.toml docs/surface-models.png [--columns N] [--spp N]
+//   heddle_surface_gallery configs/scenes/surface-gallery.toml docs/surface-models.png [--columns
+//     N] [--spp N]
 // 22 fabrics at 32 samples per pixel take some four minutes of one core.
 
 #include <fmt/format.h>
@@ -28,7 +29,8 @@ namespace {
 
 constexpr int kLabelHeight = 14;
 
-/// Letters of the labels, 5 x 7: rows from the top, '#' is ink. Letters with a descender start two rows lower.
+/// Letters of the labels, 5 x 7: rows from the top, '#' is ink. Letters with a descender start two
+/// rows lower.
 constexpr std::string_view kDescending = "gpqy";
 struct Glyph {
   char letter;
@@ -86,8 +88,9 @@ struct Page {
 
 void write_label(Page& page, int left, int top, const std::string& text) {
   for (const char letter : text) {
-    const auto glyph = std::find_if(kGlyphs.begin(), kGlyphs.end(),
-                                    [&](const Glyph& candidate) { return candidate.letter == letter; });
+    const auto glyph = std::find_if(kGlyphs.begin(), kGlyphs.end(), [&](const Glyph& candidate) {
+      return candidate.letter == letter;
+    });
     const int first = top + (kDescending.find(letter) == std::string_view::npos ? 0 : 2);
     for (int y = 0; glyph != kGlyphs.end() && y < 7; ++y) {
       for (int x = 0; x < 5; ++x) {
@@ -99,15 +102,17 @@ void write_label(Page& page, int left, int top, const std::string& text) {
 }
 
 /// The scene's first view with all its cloths drawn by `model`, 8-bit sRGB.
-std::vector<std::uint8_t> picture_of(SceneConfig config, const std::shared_ptr<const SurfaceModel>& model) {
+std::vector<std::uint8_t> picture_of(SceneConfig config,
+                                     const std::shared_ptr<const SurfaceModel>& model) {
   for (ClothConfig& cloth : config.cloths) cloth.surface.emplace().model = model;
   const ClothScene scene = make_cloth_scene(config, {});
   const ViewConfig& view = config.views.front();
   PrecomputedSettings settings;
   settings.seed = config.seed;
   const PrecomputedRenderer renderer(scene, {}, config.lights, config.background, settings);
-  const FrameBuffers frame = shade_picture(renderer, Camera(view.camera), {0, 0, view.camera.width, view.camera.height},
-                                           view.spp, [](double) {});
+  const FrameBuffers frame =
+      shade_picture(renderer, Camera(view.camera), {0, 0, view.camera.width, view.camera.height},
+                    view.spp, [](double) {});
   return tone_map(frame.beauty, 0);
 }
 
@@ -123,7 +128,8 @@ void draw_page(const std::string& scene_file, const std::string& page_file, int 
   for (int k = 0; k < count; ++k) {
     const int left = k % columns * width;
     const int top = k / columns * height;
-    const std::vector<std::uint8_t> picture = picture_of(config, read_surface_model(surface_preset(names[k])));
+    const std::vector<std::uint8_t> picture =
+        picture_of(config, read_surface_model(surface_preset(names[k])));
     for (int y = 0; y < height - kLabelHeight; ++y) {
       std::copy_n(&picture[static_cast<std::size_t>(3 * y * width)], 3 * width,
                   page.pixel(left, top + kLabelHeight + y));
@@ -143,10 +149,13 @@ int main(int argc, char** argv) {
   std::string page;
   int columns = 4;
   int spp = 0;
-  app.add_option("scene", scene, "scene whose cloths take each surface in turn")->required()->check(CLI::ExistingFile);
+  app.add_option("scene", scene, "scene whose cloths take each surface in turn")
+      ->required()
+      ->check(CLI::ExistingFile);
   app.add_option("page", page, "PNG to write")->required();
   app.add_option("--columns", columns, "pictures side by side")->check(CLI::Range(1, 64));
-  app.add_option("--spp", spp, "samples per pixel; those of the scene where absent")->check(CLI::Range(1, 65536));
+  app.add_option("--spp", spp, "samples per pixel; those of the scene where absent")
+      ->check(CLI::Range(1, 65536));
   CLI11_PARSE(app, argc, argv);
   try {
     heddle::draw_page(scene, page, columns, spp);

@@ -1,12 +1,17 @@
-// What one value of a surface model costs, for every preset: one thread, so that rates are per core.
+// What one value of a surface model costs, for every preset: one thread, so that rates are per
+// core.
 //
-//   heddle_surface_models [--benchmark_filter=REGEX]     model.quantity.fabric: reflected (a point), footprint_0.1mm,
-//                                                        footprint_0.5mm, far (20 mm), sample, pdf, sg (sharpness 100), all at a point
-//   heddle_surface_models --pairs N                      instead: reflected() for N random, grazing and opposite pairs of
-//                                                        directions and each preset, at random places, seen as points, at footprints
-//                                                        from 0.01 to 1 mm, and from afar, and of the interactive form under Gaussian
-//                                                        lights, on all threads; 1 where one is
-//                                                        negative or not finite
+//   heddle_surface_models [--benchmark_filter=REGEX]     model.quantity.fabric: reflected (a
+//                                                        point), footprint_0.1mm, footprint_0.5mm,
+//                                                        far (20 mm), sample, pdf, sg (sharpness
+//                                                        100), all at a point
+//   heddle_surface_models --pairs N                      instead: reflected() for N random, grazing
+//                                                        and opposite pairs of directions and each
+//                                                        preset, at random places, seen as points,
+//                                                        at footprints from 0.01 to 1 mm, and from
+//                                                        afar, and of the interactive form under
+//                                                        Gaussian lights, on all threads; 1 where
+//                                                        one is negative or not finite
 
 #include <benchmark/benchmark.h>
 #include <fmt/format.h>
@@ -31,13 +36,14 @@
 namespace heddle {
 namespace {
 
-constexpr float kFar = 20;  // mm: a footprint of many repeats
+constexpr float kFar = 20;                 // mm: a footprint of many repeats
 constexpr std::size_t kDirections = 1024;  // pairs that a benchmark goes through: a power of 2
 
 std::vector<std::pair<Vec3d, Vec3d>> directions() {
   RandomStream random(1, RandomStage::kBench, 0, 0);
   std::vector<std::pair<Vec3d, Vec3d>> pairs;
-  for (std::size_t k = 0; k < kDirections; ++k) pairs.emplace_back(random_above(random), random_above(random));
+  for (std::size_t k = 0; k < kDirections; ++k)
+    pairs.emplace_back(random_above(random), random_above(random));
   return pairs;
 }
 
@@ -61,10 +67,11 @@ void add_benchmarks(const std::string& name) {
     return m.reflected({}, wi, wo).sum();
   });
   const auto add_footprint = [&](const char* quantity, float footprint) {
-    add(quantity, [footprint](const SurfaceModel& m, const Vec3d& wi, const Vec3d& wo, std::size_t k) {
-      const auto place = static_cast<float>(k % kDirections) / kDirections;
-      return m.reflected({Vec2(3 * place, 7 * place), footprint}, wi, wo).sum();
-    });
+    add(quantity,
+        [footprint](const SurfaceModel& m, const Vec3d& wi, const Vec3d& wo, std::size_t k) {
+          const auto place = static_cast<float>(k % kDirections) / kDirections;
+          return m.reflected({Vec2(3 * place, 7 * place), footprint}, wi, wo).sum();
+        });
   };
   add_footprint("footprint_0.1mm", 0.1F);
   add_footprint("footprint_0.5mm", 0.5F);
@@ -82,7 +89,8 @@ void add_benchmarks(const std::string& name) {
   });
 }
 
-/// A place on the cloth, and in turns a point, a footprint from 0.01 to 1 mm, and one of many repeats.
+/// A place on the cloth, and in turns a point, a footprint from 0.01 to 1 mm, and one of many
+/// repeats.
 SurfacePoint random_point(RandomStream& random, int k) {
   SurfacePoint point;
   point.position_mm = 20 * Vec2(random.uniform(), random.uniform());
@@ -116,12 +124,13 @@ bool check_pairs(const std::string& name, int pairs) {
     return Result{a.bad + b.bad, std::max(a.most, b.most)};
   });
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
-  fmt::print("{:<28} {} pairs, {} negative or not finite, largest {:.4g}, {:.1f} s\n", name, pairs, all.bad, all.most,
-             seconds.count());
+  fmt::print("{:<28} {} pairs, {} negative or not finite, largest {:.4g}, {:.1f} s\n", name, pairs,
+             all.bad, all.most, seconds.count());
   return all.bad == 0;
 }
 
-/// The same of the interactive form of a microcylinder fabric: an open surface, one Gaussian light of sharpness 0 or 0.01 to 10^6.
+/// The same of the interactive form of a microcylinder fabric: an open surface, one Gaussian light
+/// of sharpness 0 or 0.01 to 10^6.
 bool check_interactive(const std::string& name, int pairs) {
   const InteractiveMicrocylinder model(read_microcylinder_fabric(surface_preset(name)), {});
   const auto start = std::chrono::steady_clock::now();
@@ -142,8 +151,10 @@ bool check_interactive(const std::string& name, int pairs) {
   });
   const int all = bad.combine(std::plus<>());
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
-  fmt::print("{:<28} {} pairs by the interactive form, {} negative or not finite, {:.1f} s, {:.0f} a second\n", name, pairs, all,
-             seconds.count(), pairs / seconds.count());
+  fmt::print(
+      "{:<28} {} pairs by the interactive form, {} negative or not finite, {:.1f} s, {:.0f} a "
+      "second\n",
+      name, pairs, all, seconds.count(), pairs / seconds.count());
   return all == 0;
 }
 
@@ -151,12 +162,14 @@ int run(int argc, char** argv) {
   benchmark::Initialize(&argc, argv);
   CLI::App app("Cost and robustness of the surface models");
   int pairs = 0;
-  app.add_option("--pairs", pairs, "check that many pairs of directions for each preset")->check(CLI::PositiveNumber);
+  app.add_option("--pairs", pairs, "check that many pairs of directions for each preset")
+      ->check(CLI::PositiveNumber);
   CLI11_PARSE(app, argc, argv);
   if (pairs > 0) {
     bool good = true;
     for (const std::string& name : surface_preset_names()) good = check_pairs(name, pairs) && good;
-    for (const std::string& name : surface_preset_names("microcylinder")) good = check_interactive(name, pairs) && good;
+    for (const std::string& name : surface_preset_names("microcylinder"))
+      good = check_interactive(name, pairs) && good;
     return good ? 0 : 1;
   }
   for (const std::string& name : surface_preset_names()) add_benchmarks(name);

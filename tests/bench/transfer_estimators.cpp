@@ -1,8 +1,11 @@
-// How much faster is the transfer baker's estimator than the one the paper prints? Both estimate the matrix of the same
-// cells, in batches of equal path counts; the figure of merit is 1 / (variance of the matrix in Frobenius norm x seconds).
-//   printed: w0 uniform over the face's hemisphere, w1 uniform over the sphere, next-event estimation towards w0 at each
+// How much faster is the transfer baker's estimator than the one the paper prints? Both estimate
+// the matrix of the same cells, in batches of equal path counts; the figure of merit is 1 /
+// (variance of the matrix in Frobenius norm x seconds).
+//   printed: w0 uniform over the face's hemisphere, w1 uniform over the sphere, next-event
+//     estimation towards w0 at each
 //            vertex of a BCSDF-sampled path (Khungurn 2017, section 4.2);
-//   shipped: w1 uniform, the path itself finds w0 (precompute/transfer_bake.h), here without its stratification too.
+//   shipped: w1 uniform, the path itself finds w0 (precompute/transfer_bake.h), here without its
+//     stratification too.
 // usage: heddle_transfer_estimators FABRIC.toml ...
 
 #include <fmt/format.h>
@@ -44,7 +47,8 @@ Merit measure(Batch&& batch) {
     merit.mean += m / kBatches;
     squares += m.square() / kBatches;
   }
-  merit.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() / kBatches;
+  merit.seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() / kBatches;
   merit.variance = (squares - merit.mean.square()).sum() * kBatches / (kBatches - 1);
   return merit;
 }
@@ -83,7 +87,8 @@ void compare_estimators(const std::string& path) {
     const Merit printed = measure([&](int batch) {
       Matrix sum = Matrix::Zero(kCoefficients, 3 * kCoefficients);
       for (int i = 0; i < kPathsPerBatch; ++i) {
-        RandomStream random(1, RandomStage::kBench, 100 + cell, static_cast<std::uint64_t>(batch * kPathsPerBatch + i));
+        RandomStream random(1, RandomStage::kBench, 100 + cell,
+                            static_cast<std::uint64_t>(batch * kPathsPerBatch + i));
         const std::uint32_t segment = segments[random.index(segments.size())];
         const Vec3 w0 = sample_hemisphere(Vec3(0, 0, 1), random);
         const Vec3 w1 = sample_sphere(random);
@@ -91,10 +96,12 @@ void compare_estimators(const std::string& path) {
         if (!first) continue;
         Rgb radiance = Rgb::Zero();
         walk_path(trace, materials, *first, -w1, Rgb::Ones(), random, WalkLimits{},
-                  [&](const TileTrace::Vertex& v, const Mat3& frame, const Vec3& wo, const Rgb& throughput, int) {
+                  [&](const TileTrace::Vertex& v, const Mat3& frame, const Vec3& wo,
+                      const Rgb& throughput, int) {
                     if (trace.escapes(v, w0)) {
                       const Vec3 local = frame.transpose() * w0;
-                      radiance += throughput * materials[v.material].evaluate(local, frame.transpose() * wo) *
+                      radiance += throughput *
+                                  materials[v.material].evaluate(local, frame.transpose() * wo) *
                                   std::sqrt(std::max(0.0F, 1 - local.x() * local.x()));
                     }
                     return true;
@@ -106,23 +113,31 @@ void compare_estimators(const std::string& path) {
     const Merit shipped = measure([&](int batch) {
       Matrix sum = Matrix::Zero(kCoefficients, 3 * kCoefficients);
       for (int i = 0; i < kPathsPerBatch; ++i) {
-        RandomStream random(1, RandomStage::kBench, 200 + cell, static_cast<std::uint64_t>(batch * kPathsPerBatch + i));
+        RandomStream random(1, RandomStage::kBench, 200 + cell,
+                            static_cast<std::uint64_t>(batch * kPathsPerBatch + i));
         const std::uint32_t segment = segments[random.index(segments.size())];
         const Vec3 w1 = sample_sphere(random);
         const auto first = trace.next(trace.at(exemplar.segment_midpoint(segment), segment), w1);
         if (!first) continue;
-        const auto escape = walk_path(trace, materials, *first, -w1, Rgb::Ones(), random, WalkLimits{},
-                                      [](auto&&...) { return true; });
-        if (escape && escape->direction.z() > 0) add(sum, 4 * kPi, escape->direction, w1, escape->throughput);
+        const auto escape = walk_path(trace, materials, *first, -w1, Rgb::Ones(), random,
+                                      WalkLimits{}, [](auto&&...) { return true; });
+        if (escape && escape->direction.z() > 0)
+          add(sum, 4 * kPi, escape->direction, w1, escape->throughput);
       }
       return sum;
     });
-    const double ratio = (printed.variance * printed.seconds) / (shipped.variance * shipped.seconds);
-    const double noise = std::sqrt((printed.variance + shipped.variance) / kBatches / shipped.mean.square().sum());
-    const double difference = std::sqrt((printed.mean - shipped.mean).square().sum() / shipped.mean.square().sum());
-    fmt::print("  cell {:4}: efficiency shipped / printed {:6.2f} (variance {:5.2f} x, time {:5.2f} x); means differ by "
-               "{:.3f}, noise of the difference {:.3f}\n",
-               cell, ratio, printed.variance / shipped.variance, printed.seconds / shipped.seconds, difference, noise);
+    const double ratio =
+        (printed.variance * printed.seconds) / (shipped.variance * shipped.seconds);
+    const double noise =
+        std::sqrt((printed.variance + shipped.variance) / kBatches / shipped.mean.square().sum());
+    const double difference =
+        std::sqrt((printed.mean - shipped.mean).square().sum() / shipped.mean.square().sum());
+    fmt::print(
+        "  cell {:4}: efficiency shipped / printed {:6.2f} (variance {:5.2f} x, time {:5.2f} x); "
+        "means differ by "
+        "{:.3f}, noise of the difference {:.3f}\n",
+        cell, ratio, printed.variance / shipped.variance, printed.seconds / shipped.seconds,
+        difference, noise);
     ratio_sum += ratio;
   }
   fmt::print("{}: mean efficiency ratio {:.2f} over {} cells\n", path, ratio_sum / kCells, kCells);

@@ -1,16 +1,22 @@
 // Makes chosen calls of a program fail: preloaded (LD_PRELOAD) into the program that a test runs.
 //
-// Only calls on files and folders below one folder count, by kinds; calls of one kind are numbered from 1, over all threads.
+// Only calls on files and folders below one folder count, by kinds; calls of one kind are numbered
+// from 1, over all threads.
 //
 //   HEDDLE_FAULT_FOLDER    absolute path; without it, nothing is counted and nothing fails
-//   HEDDLE_FAULT_LOG       a file: one line "KIND NUMBER PATH" for every call that counts, "FAULT " in front of those that fail
-//   HEDDLE_FAULT_KIND      the kind that fails: one of kKinds below, or "change": every call that would change something
+//   HEDDLE_FAULT_LOG       a file: one line "KIND NUMBER PATH" for every call that counts, "FAULT "
+//                          in front of those that fail
+//   HEDDLE_FAULT_KIND      the kind that fails: one of kKinds below, or "change": every call that
+//                          would change something
 //   HEDDLE_FAULT_NUMBER    which call of that kind
-//   HEDDLE_FAULT_ERROR     errno that it fails with; "short": a write takes half of its bytes; "kill": SIGKILL before the call
-//   HEDDLE_FAULT_LASTING   where set: those after it fail as well. With "short", they fail with ENOSPC: the disk is full
+//   HEDDLE_FAULT_ERROR     errno that it fails with; "short": a write takes half of its bytes;
+//                          "kill": SIGKILL before the call
+//   HEDDLE_FAULT_LASTING   where set: those after it fail as well. With "short", they fail with
+//                          ENOSPC: the disk is full
 //
-// Which calls matter was read off strace and off what the libraries import: libstdc++ writes files by write, writev, fopen64 and
-// fclose, OpenEXR and OpenVDB use its streams, remove and truncate come from it, too.
+// Which calls matter was read off strace and off what the libraries import: libstdc++ writes files
+// by write, writev, fopen64 and fclose, OpenEXR and OpenVDB use its streams, remove and truncate
+// come from it, too.
 
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -42,8 +48,9 @@ enum Kind {
   kTruncate,
   kKindCount
 };
-static const char* const kKinds[kKindCount] = {"write",  "read",       "flush",     "flush-folder", "close",       "rename",
-                                               "open-write", "open-read", "open-folder", "make-folder", "unlink", "truncate"};
+static const char* const kKinds[kKindCount] = {
+    "write",      "read",      "flush",       "flush-folder", "close",  "rename",
+    "open-write", "open-read", "open-folder", "make-folder",  "unlink", "truncate"};
 
 enum { kPathSize = 8192, kNone = -1, kAnyChange = kKindCount };
 enum { kShort = -2, kKill = -3 };
@@ -57,7 +64,7 @@ static int log_descriptor = -1;
 static atomic_long counts[kKindCount];
 
 /// The program's own function behind ours.
-#define REAL(name) \
+#define REAL(name)               \
   static __typeof__(&name) real; \
   if (!real) real = (__typeof__(&name))dlsym(RTLD_NEXT, #name)
 
@@ -65,7 +72,9 @@ __attribute__((constructor)) static void set_up(void) {
   const char* place = getenv("HEDDLE_FAULT_FOLDER");
   if (!place || strlen(place) >= sizeof folder) return;
   const char* log = getenv("HEDDLE_FAULT_LOG");
-  if (log) log_descriptor = (int)syscall(SYS_openat, AT_FDCWD, log, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
+  if (log)
+    log_descriptor =
+        (int)syscall(SYS_openat, AT_FDCWD, log, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
   const char* kind = getenv("HEDDLE_FAULT_KIND");
   for (int k = 0; kind && k < kKindCount; ++k) {
     if (strcmp(kind, kKinds[k]) == 0) fault_kind = k;
@@ -74,7 +83,10 @@ __attribute__((constructor)) static void set_up(void) {
   const char* number = getenv("HEDDLE_FAULT_NUMBER");
   fault_number = number ? atol(number) : 0;
   const char* error = getenv("HEDDLE_FAULT_ERROR");
-  if (error) fault_error = strcmp(error, "short") == 0 ? kShort : strcmp(error, "kill") == 0 ? kKill : atoi(error);
+  if (error)
+    fault_error = strcmp(error, "short") == 0  ? kShort
+                  : strcmp(error, "kill") == 0 ? kKill
+                                               : atoi(error);
   lasting = getenv("HEDDLE_FAULT_LASTING") != NULL;
   strcpy(folder, place);
 }
@@ -82,22 +94,27 @@ __attribute__((constructor)) static void set_up(void) {
 static void note(const char* prefix, enum Kind kind, long number, const char* path) {
   if (log_descriptor < 0) return;
   char line[kPathSize + 64];
-  const int length = snprintf(line, sizeof line, "%s%s %ld %s\n", prefix, kKinds[kind], number, path);
+  const int length =
+      snprintf(line, sizeof line, "%s%s %ld %s\n", prefix, kKinds[kind], number, path);
   if (length > 0) syscall(SYS_write, log_descriptor, line, (size_t)length);
 }
 
 static int changes_something(enum Kind kind, const char* path) {
   // Even where nothing can be written, making a folder that is there fails with EEXIST.
   if (kind == kMakeFolder) return access(path, F_OK) != 0;
-  return kind == kWrite || kind == kRename || kind == kOpenWrite || kind == kUnlink || kind == kTruncate;
+  return kind == kWrite || kind == kRename || kind == kOpenWrite || kind == kUnlink ||
+         kind == kTruncate;
 }
 
 /// Counts a call. 0: it may go on; kShort; else the errno that it is to fail with.
 static int fault_of(enum Kind kind, const char* path) {
   const size_t length = strlen(folder);
-  if (length == 0 || strncmp(path, folder, length) != 0 || (path[length] != '/' && path[length] != '\0')) return 0;
+  if (length == 0 || strncmp(path, folder, length) != 0 ||
+      (path[length] != '/' && path[length] != '\0'))
+    return 0;
   const long number = ++counts[kind];
-  int fails = (int)kind == fault_kind && (number == fault_number || (lasting && number > fault_number));
+  int fails =
+      (int)kind == fault_kind && (number == fault_number || (lasting && number > fault_number));
   if (fault_kind == kAnyChange) fails = changes_something(kind, path);
   if (!fails) {
     note("", kind, number, path);
@@ -155,7 +172,7 @@ static int fail(int error) {
 }
 
 // Where a fault is due: `return -1` with errno.
-#define FAIL_IF(fault) \
+#define FAIL_IF(fault)          \
   const int injected = (fault); \
   if (injected > 0) return fail(injected)
 
@@ -163,19 +180,20 @@ static int open_fault(int at, const char* path, int flags) {
   if (folder[0] == '\0' || !path) return 0;
   const int saved = errno;
   struct stat status;
-  const int is_folder = (flags & O_DIRECTORY) || (fstatat(at, path, &status, 0) == 0 && S_ISDIR(status.st_mode));
+  const int is_folder =
+      (flags & O_DIRECTORY) || (fstatat(at, path, &status, 0) == 0 && S_ISDIR(status.st_mode));
   errno = saved;
   if (is_folder) return path_fault(kOpenFolder, at, path);
   return path_fault((flags & (O_WRONLY | O_RDWR | O_CREAT)) ? kOpenWrite : kOpenRead, at, path);
 }
 
-#define TAKE_MODE(mode, flags) \
-  mode_t mode = 0; \
+#define TAKE_MODE(mode, flags)           \
+  mode_t mode = 0;                       \
   if ((flags) & (O_CREAT | O_TMPFILE)) { \
-    va_list arguments; \
-    va_start(arguments, flags); \
-    mode = va_arg(arguments, mode_t); \
-    va_end(arguments); \
+    va_list arguments;                   \
+    va_start(arguments, flags);          \
+    mode = va_arg(arguments, mode_t);    \
+    va_end(arguments);                   \
   }
 
 int open(const char* path, int flags, ...) {

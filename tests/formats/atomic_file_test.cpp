@@ -78,7 +78,8 @@ TEST_F(AtomicFileTest, AFullDiskIsSeenAtTheLastByte) {
   const auto path = put("a", "old");
   ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &full), 0);
   const std::string fits = error_of([&] { write_file_atomically(path, std::string(100, 'x')); });
-  const std::string last_byte = error_of([&] { write_file_atomically(path, std::string(101, 'y')); });
+  const std::string last_byte =
+      error_of([&] { write_file_atomically(path, std::string(101, 'y')); });
   ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &old), 0);
   signal(SIGXFSZ, ignored);
   EXPECT_EQ(fits, "no error");
@@ -123,7 +124,8 @@ TEST_F(AtomicFileTest, ALinkStaysAndItsFileIsReplaced) {
   write_file_atomically(folder_ / "dangling", "made");
   EXPECT_EQ(bytes_of(folder_ / "elsewhere/not yet"), "made");
   std::filesystem::create_symlink("loop", folder_ / "loop");
-  EXPECT_NE(error_of([&] { write_file_atomically(folder_ / "loop", "x"); }).find("symbolic links"), std::string::npos);
+  EXPECT_NE(error_of([&] { write_file_atomically(folder_ / "loop", "x"); }).find("symbolic links"),
+            std::string::npos);
 }
 
 TEST_F(AtomicFileTest, AFolderReplacesAFolderAsAWhole) {
@@ -159,20 +161,23 @@ TEST_F(AtomicFileTest, WhatADeadProcessLeftGoesAndWhatOthersWriteStays) {
   ASSERT_EQ(waitpid(dead, nullptr, 0), dead);
   // A folder that this process has not searched yet.
   const auto folder = folder_ / "fresh";
-  std::filesystem::create_directories(folder / (prefix + std::to_string(dead) + "-0.tmp") / "inside");
+  std::filesystem::create_directories(folder / (prefix + std::to_string(dead) + "-0.tmp") /
+                                      "inside");
   const auto put_here = [&](const std::string& name) { put("fresh/" + name, "x"); };
   put_here(prefix + std::to_string(dead) + "-1.tmp");
-  put_here(prefix + std::to_string(getpid()) + "-99999.tmp");  // of an earlier process with our number
-  put_here(prefix + std::to_string(getppid()) + "-0.tmp");     // alive
-  put_here(".heddle-00000000-1-0.tmp");                        // of another machine, new
-  put_here(".heddle-00000000-1-1.tmp");                        // of another machine, old
+  // of an earlier process with our number
+  put_here(prefix + std::to_string(getpid()) + "-99999.tmp");
+  put_here(prefix + std::to_string(getppid()) + "-0.tmp");  // alive
+  put_here(".heddle-00000000-1-0.tmp");                     // of another machine, new
+  put_here(".heddle-00000000-1-1.tmp");                     // of another machine, old
   put_here("picture.tmp");
   const auto old = std::filesystem::file_time_type::clock::now() - std::chrono::hours(25);
   std::filesystem::last_write_time(folder / ".heddle-00000000-1-1.tmp", old);
 
   write_file_atomically(folder / "a", "text");
   std::set<std::string> names;
-  for (const auto& entry : std::filesystem::directory_iterator(folder)) names.insert(entry.path().filename());
+  for (const auto& entry : std::filesystem::directory_iterator(folder))
+    names.insert(entry.path().filename());
   const std::set<std::string> expected = {"a", "picture.tmp", ".heddle-00000000-1-0.tmp",
                                           prefix + std::to_string(getppid()) + "-0.tmp"};
   EXPECT_EQ(names, expected);
@@ -187,7 +192,8 @@ TEST_F(AtomicFileTest, AProcessThatEndsAtOnceCanRemoveItsTemporaries) {
     remove_own_temporaries();
     // What another thread is about to rename would be half a file or a folder half emptied.
     const std::string error = error_of([&] { file.commit(); });
-    _exit(was_there && file_count() == 1 && error.find("cannot replace") != std::string::npos ? 0 : 1);
+    _exit(was_there && file_count() == 1 && error.find("cannot replace") != std::string::npos ? 0
+                                                                                              : 1);
   }
   int status = 1;
   ASSERT_EQ(waitpid(ending, &status, 0), ending);
@@ -197,15 +203,18 @@ TEST_F(AtomicFileTest, AProcessThatEndsAtOnceCanRemoveItsTemporaries) {
 }
 
 TEST_F(AtomicFileTest, SystemErrorsAreNamed) {
-  EXPECT_NE(
-      error_of([&] { write_file_atomically(folder_ / "no" / "a", "x"); }).find("No such file or directory"),
-      std::string::npos);
+  EXPECT_NE(error_of([&] {
+              write_file_atomically(folder_ / "no" / "a", "x");
+            }).find("No such file or directory"),
+            std::string::npos);
   // The target is a folder: the rename fails after the temporary file was written.
   std::filesystem::create_directories(folder_ / "taken" / "inside");
   EXPECT_NE(error_of([&] { write_file_atomically(folder_ / "taken", "x"); }).find("cannot replace"),
             std::string::npos);
   EXPECT_EQ(file_count(), 1u);
-  EXPECT_NE(error_of([&] { read_whole_file(folder_ / "absent"); }).find("absent: cannot open: No such file"),
+  EXPECT_NE(error_of([&] {
+              read_whole_file(folder_ / "absent");
+            }).find("absent: cannot open: No such file"),
             std::string::npos);
   EXPECT_NE(error_of([&] { read_whole_file(folder_); }).find("Is a directory"), std::string::npos);
 }
@@ -217,7 +226,8 @@ TEST_F(AtomicFileTest, FilesThatTheMachineCannotHoldAreRefusedWithNumbers) {
     read_whole_file(path);
     FAIL();
   } catch (const MemoryError& error) {
-    EXPECT_EQ(std::string(error.what()).find(path.string() + ": needs 4398.0 GB of memory, "), 0U) << error.what();
+    EXPECT_EQ(std::string(error.what()).find(path.string() + ": needs 4398.0 GB of memory, "), 0U)
+        << error.what();
   }
 }
 

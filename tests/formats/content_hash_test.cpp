@@ -28,7 +28,8 @@ TEST_F(ContentHashTest, UnreadableFilesAreErrors) {
             std::string::npos);
   EXPECT_NE(error_of([&] { content_hash_of_file(folder_); }), "no error");
   // As where another process has just swept the file away.
-  EXPECT_NE(error_of([&] { seal_of_file(folder_ / "absent"); }).find("absent: cannot open"), std::string::npos);
+  EXPECT_NE(error_of([&] { seal_of_file(folder_ / "absent"); }).find("absent: cannot open"),
+            std::string::npos);
 }
 
 }  // namespace

@@ -33,7 +33,8 @@ class FileFixture : public testing::Test {
     return {std::istreambuf_iterator<char>(file), {}};
   }
   std::size_t file_count() const {
-    return static_cast<std::size_t>(std::distance(std::filesystem::directory_iterator(folder_), {}));
+    return static_cast<std::size_t>(
+        std::distance(std::filesystem::directory_iterator(folder_), {}));
   }
   /// The FileError's text, or "no error".
   template <class Function>

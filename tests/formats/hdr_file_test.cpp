@@ -16,16 +16,18 @@ class HdrFileFormat : public FileFixture {};
 using Pixel = std::array<std::uint8_t, 4>;
 
 std::string header(int width, int height, const std::string& extra = "") {
-  return "#?RADIANCE\n# a comment\n" + extra + "FORMAT=32-bit_rle_rgbe\n\n-Y " + std::to_string(height) + " +X " +
-         std::to_string(width) + "\n";
+  return "#?RADIANCE\n# a comment\n" + extra + "FORMAT=32-bit_rle_rgbe\n\n-Y " +
+         std::to_string(height) + " +X " + std::to_string(width) + "\n";
 }
 
-// Mantissas, and exponents around 128; some pixels black, long even stretches, none that could be taken for a code.
+// Mantissas, and exponents around 128; some pixels black, long even stretches, none that could be
+// taken for a code.
 std::vector<Pixel> sample(int width, int height) {
   std::vector<Pixel> pixels;
   for (int i = 0; i < width * height; ++i) {
     const int k = i % 50 < 30 ? i / 50 : i;
-    pixels.push_back({static_cast<std::uint8_t>(130 + k % 7), static_cast<std::uint8_t>(k * 31 % 256),
+    pixels.push_back({static_cast<std::uint8_t>(130 + k % 7),
+                      static_cast<std::uint8_t>(k * 31 % 256),
                       static_cast<std::uint8_t>(k * 5 % 256),
                       static_cast<std::uint8_t>(k % 9 == 0 ? 0 : 120 + k % 16)});
   }
@@ -62,7 +64,8 @@ std::string old_runs(const std::vector<Pixel>& pixels, int width) {
 std::string new_runs(const std::vector<Pixel>& pixels, int width) {
   std::string bytes;
   for (std::size_t begin = 0; begin < pixels.size(); begin += static_cast<std::size_t>(width)) {
-    append(bytes, {2, 2, static_cast<std::uint8_t>(width / 256), static_cast<std::uint8_t>(width % 256)});
+    append(bytes,
+           {2, 2, static_cast<std::uint8_t>(width / 256), static_cast<std::uint8_t>(width % 256)});
     for (std::size_t c = 0; c < 4; ++c) {
       const std::size_t end = begin + static_cast<std::size_t>(width);
       for (std::size_t i = begin; i < end;) {
@@ -83,7 +86,8 @@ std::string new_runs(const std::vector<Pixel>& pixels, int width) {
 }
 
 void expect_pixels(const Image& image, const std::vector<Pixel>& pixels, double exposure = 1) {
-  ASSERT_EQ(static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height), pixels.size());
+  ASSERT_EQ(static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height),
+            pixels.size());
   ASSERT_EQ(image.channels.size(), 3U);
   const char* names[] = {"R", "G", "B"};
   for (std::size_t c = 0; c < 3; ++c) {
@@ -91,7 +95,8 @@ void expect_pixels(const Image& image, const std::vector<Pixel>& pixels, double 
     EXPECT_EQ(channel.type, ChannelType::kFloat);
     ASSERT_EQ(channel.values.size(), pixels.size());
     for (std::size_t i = 0; i < pixels.size(); ++i) {
-      const double value = pixels[i][3] == 0 ? 0 : pixels[i][c] * std::exp2(pixels[i][3] - 136.0) / exposure;
+      const double value =
+          pixels[i][3] == 0 ? 0 : pixels[i][c] * std::exp2(pixels[i][3] - 136.0) / exposure;
       EXPECT_FLOAT_EQ(channel.values[i], static_cast<float>(value));
     }
   }
@@ -112,10 +117,14 @@ TEST_F(HdrFileFormat, AllEncodingsAreOneImage) {
 
 TEST_F(HdrFileFormat, ExposuresAreDividedOut) {
   const std::vector<Pixel> pixels = sample(10, 1);
-  expect_pixels(read_hdr(put("a.hdr", header(10, 1, "EXPOSURE=2\nGAMMA=1\nEXPOSURE= 0.25 \n") + flat(pixels))), pixels,
-                0.5);
-  for (const char* bad : {"EXPOSURE=0\n", "EXPOSURE=-1\n", "EXPOSURE=x\n", "EXPOSURE=nan\n", "EXPOSURE=1e-300\n"}) {
-    EXPECT_NE(error_of([&] { read_hdr(put("a.hdr", header(10, 1, bad) + flat(pixels))); }).find("EXPOSURE"),
+  expect_pixels(read_hdr(put("a.hdr", header(10, 1, "EXPOSURE=2\nGAMMA=1\nEXPOSURE= 0.25 \n") +
+                                          flat(pixels))),
+                pixels, 0.5);
+  for (const char* bad :
+       {"EXPOSURE=0\n", "EXPOSURE=-1\n", "EXPOSURE=x\n", "EXPOSURE=nan\n", "EXPOSURE=1e-300\n"}) {
+    EXPECT_NE(error_of([&] {
+                read_hdr(put("a.hdr", header(10, 1, bad) + flat(pixels)));
+              }).find("EXPOSURE"),
               std::string::npos);
   }
 }
@@ -126,9 +135,11 @@ TEST_F(HdrFileFormat, EveryTruncationAndExtensionIsRefused) {
     const std::string whole = header(20, 3) + body;
     EXPECT_EQ(error_of([&] { read_hdr(put("a.hdr", whole)); }), "no error");
     for (std::size_t size = 0; size < whole.size(); ++size) {
-      EXPECT_NE(error_of([&] { read_hdr(put("t.hdr", whole.substr(0, size))); }), "no error") << size;
+      EXPECT_NE(error_of([&] { read_hdr(put("t.hdr", whole.substr(0, size))); }), "no error")
+          << size;
     }
-    EXPECT_NE(error_of([&] { read_hdr(put("t.hdr", whole + "x")); }).find("after the last line"), std::string::npos);
+    EXPECT_NE(error_of([&] { read_hdr(put("t.hdr", whole + "x")); }).find("after the last line"),
+              std::string::npos);
   }
 }
 
@@ -154,13 +165,17 @@ TEST_F(HdrFileFormat, RunsBeyondTheLineAreRefused) {
     return error_of([&] { read_hdr(put("a.hdr", header(width, 1) + body)); });
   };
   // 128 + 9 and 9 plain values on a line of 8; a count of 0.
-  EXPECT_NE(error_with(8, std::string("\x02\x02\x00\x08\x89\x01", 6) + std::string(60, '\x01')).find("beyond"),
+  EXPECT_NE(error_with(8, std::string("\x02\x02\x00\x08\x89\x01", 6) + std::string(60, '\x01'))
+                .find("beyond"),
             std::string::npos);
-  EXPECT_NE(error_with(8, std::string("\x02\x02\x00\x08\x09", 5) + std::string(60, '\x01')).find("beyond"),
+  EXPECT_NE(error_with(8, std::string("\x02\x02\x00\x08\x09", 5) + std::string(60, '\x01'))
+                .find("beyond"),
             std::string::npos);
-  EXPECT_NE(error_with(8, std::string("\x02\x02\x00\x08\x00", 5) + std::string(60, '\x01')).find("beyond"),
+  EXPECT_NE(error_with(8, std::string("\x02\x02\x00\x08\x00", 5) + std::string(60, '\x01'))
+                .find("beyond"),
             std::string::npos);
-  EXPECT_NE(error_with(8, std::string("\x02\x02\x00\x09", 4) + std::string(60, '\x01')).find("another width"),
+  EXPECT_NE(error_with(8, std::string("\x02\x02\x00\x09", 4) + std::string(60, '\x01'))
+                .find("another width"),
             std::string::npos);
   EXPECT_NE(error_with(4, "\x09\x09\x09\x80\x01\x01\x01\x04").find("beyond"), std::string::npos);
   EXPECT_NE(error_with(4, "\x01\x01\x01\x04").find("before the first pixel"), std::string::npos);
@@ -170,14 +185,19 @@ TEST_F(HdrFileFormat, RunsBeyondTheLineAreRefused) {
 }
 
 TEST_F(HdrFileFormat, HeadersAreCheckedBeforeMemoryIsTaken) {
-  const auto error_with = [&](const std::string& bytes) { return error_of([&] { read_hdr(put("a.hdr", bytes)); }); };
+  const auto error_with = [&](const std::string& bytes) {
+    return error_of([&] { read_hdr(put("a.hdr", bytes)); });
+  };
   EXPECT_NE(error_with("P6 1 1 255\n").find("no Radiance picture"), std::string::npos);
   EXPECT_NE(error_with("#?RADIANCE\n\n-Y 1 +X 1\n1234").find("no FORMAT"), std::string::npos);
-  EXPECT_NE(error_with("#?RGBE\nFORMAT=32-bit_rle_xyze\n\n-Y 1 +X 1\n1234").find("xyze is not supported"),
-            std::string::npos);
+  EXPECT_NE(
+      error_with("#?RGBE\nFORMAT=32-bit_rle_xyze\n\n-Y 1 +X 1\n1234").find("xyze is not supported"),
+      std::string::npos);
   EXPECT_EQ(error_with("#?RGBE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 1\n1234"), "no error");
-  for (const char* size : {"+Y 1 +X 1", "-Y 0 +X 1", "-Y 1 +X -1", "-Y 1 +X 1 ", "-Y 1 +X", "+X 1 -Y 1", "-Y 1+X 1"}) {
-    EXPECT_NE(error_with(std::string("#?RGBE\nFORMAT=32-bit_rle_rgbe\n\n") + size + "\n1234").find("expected '-Y"),
+  for (const char* size :
+       {"+Y 1 +X 1", "-Y 0 +X 1", "-Y 1 +X -1", "-Y 1 +X 1 ", "-Y 1 +X", "+X 1 -Y 1", "-Y 1+X 1"}) {
+    EXPECT_NE(error_with(std::string("#?RGBE\nFORMAT=32-bit_rle_rgbe\n\n") + size + "\n1234")
+                  .find("expected '-Y"),
               std::string::npos)
         << size;
   }

@@ -10,8 +10,8 @@ namespace {
 
 class IdVolumeFileFormat : public FileFixture {};
 
-/// About a third of the voxels filled, in runs, with a solid block; sizes that are no multiples of a leaf's 8
-/// voxels.
+/// About a third of the voxels filled, in runs, with a solid block; sizes that are no multiples of
+/// a leaf's 8 voxels.
 IdVolume sample(std::array<int, 3> size, unsigned seed) {
   IdVolume volume;
   volume.size = size;
@@ -40,7 +40,8 @@ void expect_equal(const IdVolume& a, const IdVolume& b) {
 }
 
 TEST_F(IdVolumeFileFormat, RoundTrip) {
-  for (const std::array<int, 3> size : {std::array{1, 1, 1}, {8, 8, 8}, {37, 20, 21}, {130, 5, 40}}) {
+  for (const std::array<int, 3> size :
+       {std::array{1, 1, 1}, {8, 8, 8}, {37, 20, 21}, {130, 5, 40}}) {
     const IdVolume volume = sample(size, 1);
     write_id_volume(folder_ / "a.vdb", volume, {{"key", "value"}});
     expect_equal(volume, read_id_volume(folder_ / "a.vdb"));
@@ -81,9 +82,8 @@ TEST_F(IdVolumeFileFormat, EqualContentGivesEqualBytes) {
 }
 
 TEST_F(IdVolumeFileFormat, WhatIsNoVolumeIsRefused) {
-  EXPECT_NE(
-      error_of([&] { read_id_volume(folder_ / "none.vdb"); }).find("none.vdb: cannot open"),
-      std::string::npos);
+  EXPECT_NE(error_of([&] { read_id_volume(folder_ / "none.vdb"); }).find("none.vdb: cannot open"),
+            std::string::npos);
   EXPECT_NE(error_of([&] { read_id_volume(put("e.vdb", "")); }), "no error");
   EXPECT_NE(error_of([&] { read_id_volume(put("g.vdb", std::string(4096, 'x'))); }), "no error");
   EXPECT_NE(error_of([&] {
@@ -112,7 +112,8 @@ TEST_F(IdVolumeFileFormat, EveryChangedByteAndEveryCutIsRefused) {
   }
 }
 
-/// The file with a checksum that fits what it now holds: the identifier of 36 characters at byte 21.
+/// The file with a checksum that fits what it now holds: the identifier of 36 characters at
+/// byte 21.
 std::string sealed(std::string bytes) {
   const auto identifier = [](const std::string& digits) {
     std::string text;
@@ -134,17 +135,21 @@ TEST_F(IdVolumeFileFormat, SizesAreChecked) {
   const std::size_t at = bytes.find(name) + name.size();
   ASSERT_LT(at, bytes.size());
   const auto with_size = [&](const char* size) {
-    const auto path = put("t.vdb", sealed(std::string(bytes).replace(at, 12, std::string(size, 12))));
+    const auto path =
+        put("t.vdb", sealed(std::string(bytes).replace(at, 12, std::string(size, 12))));
     return error_of([&] { read_id_volume(path); });
   };
   EXPECT_EQ(with_size("\x14\0\0\0\x14\0\0\0\x14\0\0\0"), "no error");
-  EXPECT_NE(with_size("\x14\0\0\0\x14\0\0\0\0\0\0\0").find("0 voxels along an axis"), std::string::npos);
+  EXPECT_NE(with_size("\x14\0\0\0\x14\0\0\0\0\0\0\0").find("0 voxels along an axis"),
+            std::string::npos);
   EXPECT_NE(with_size("\x14\0\0\0\x14\0\0\0\xff\xff\xff\xff").find("-1 voxels along an axis"),
             std::string::npos);
   EXPECT_NE(with_size("\x01\x10\0\0\x14\0\0\0\x14\0\0\0").find("4097 voxels along an axis"),
             std::string::npos);
-  EXPECT_NE(with_size("\0\x10\0\0\0\x10\0\0\0\x10\0\0").find("68719476736 voxels"), std::string::npos);
-  EXPECT_NE(with_size("\x13\0\0\0\x14\0\0\0\x14\0\0\0").find("outside its own size"), std::string::npos);
+  EXPECT_NE(with_size("\0\x10\0\0\0\x10\0\0\0\x10\0\0").find("68719476736 voxels"),
+            std::string::npos);
+  EXPECT_NE(with_size("\x13\0\0\0\x14\0\0\0\x14\0\0\0").find("outside its own size"),
+            std::string::npos);
 }
 
 }  // namespace

@@ -153,10 +153,12 @@ TEST_F(ImageFileFormat, GarbageAndAbsentFilesAreRefused) {
   EXPECT_NE(error_of([&] { read_exr(folder_ / "none.exr"); }).find("none.exr: cannot read"),
             std::string::npos);
   EXPECT_NE(error_of([&] { read_exr(folder_); }), "no error");
-  EXPECT_NE(error_of([&] { read_exr(put("g.exr", std::string(4096, 'x'))); }).find("no OpenEXR file"),
-            std::string::npos);
-  EXPECT_NE(error_of([&] { read_exr(put("g.exr", "\x76\x2f\x31\x01\x02" + std::string(4096, '\x7f'))); }),
-            "no error");
+  EXPECT_NE(
+      error_of([&] { read_exr(put("g.exr", std::string(4096, 'x'))); }).find("no OpenEXR file"),
+      std::string::npos);
+  EXPECT_NE(
+      error_of([&] { read_exr(put("g.exr", "\x76\x2f\x31\x01\x02" + std::string(4096, '\x7f'))); }),
+      "no error");
 }
 
 TEST_F(ImageFileFormat, SizesAreCheckedBeforeMemoryIsTaken) {
@@ -173,28 +175,32 @@ TEST_F(ImageFileFormat, SizesAreCheckedBeforeMemoryIsTaken) {
   };
   const std::int32_t big = std::numeric_limits<std::int32_t>::max();
   EXPECT_EQ(with_window({0, 0, 8, 39}), "no error");
-  EXPECT_NE(with_window({0, 0, 16384, 39}).find("16385 x 40 pixels (at most 16384 x 16384)"), std::string::npos);
+  EXPECT_NE(with_window({0, 0, 16384, 39}).find("16385 x 40 pixels (at most 16384 x 16384)"),
+            std::string::npos);
   EXPECT_NE(with_window({0, 0, big, big}), "no error");
   EXPECT_NE(with_window({-big, -big, big, big}), "no error");
   EXPECT_NE(with_window({0, 0, -1, -1}), "no error");
   EXPECT_NE(with_window({0, 0, 16383, 16383}), "no error");
-  // The same number of blocks, so that their table is fine; 14 MB of pixels cannot come out of this file.
+  // The same number of blocks, so that their table is fine; 14 MB of pixels cannot come out of this
+  // file.
   EXPECT_NE(with_window({0, 0, 16383, 39}).find("too short"), std::string::npos);
 
   Imf::Header many(16384, 65);
-  for (int i = 0; i < 1024; ++i) many.channels().insert(std::to_string(i), Imf::Channel(Imf::FLOAT));
+  for (int i = 0; i < 1024; ++i)
+    many.channels().insert(std::to_string(i), Imf::Channel(Imf::FLOAT));
   { Imf::OutputFile file((folder_ / "a.exr").c_str(), many); }
   EXPECT_NE(error_of([&] { read_exr(folder_ / "a.exr"); }).find("1090519040 values (at most"),
             std::string::npos);
 }
 
-const Imf::Compression kCompressions[] = {Imf::NO_COMPRESSION,    Imf::RLE_COMPRESSION,   Imf::ZIPS_COMPRESSION, Imf::ZIP_COMPRESSION,
-                                          Imf::PIZ_COMPRESSION,   Imf::PXR24_COMPRESSION, Imf::B44_COMPRESSION,  Imf::B44A_COMPRESSION,
-                                          Imf::DWAA_COMPRESSION,  Imf::DWAB_COMPRESSION};
+const Imf::Compression kCompressions[] = {
+    Imf::NO_COMPRESSION,   Imf::RLE_COMPRESSION,   Imf::ZIPS_COMPRESSION, Imf::ZIP_COMPRESSION,
+    Imf::PIZ_COMPRESSION,  Imf::PXR24_COMPRESSION, Imf::B44_COMPRESSION,  Imf::B44A_COMPRESSION,
+    Imf::DWAA_COMPRESSION, Imf::DWAB_COMPRESSION};
 
 /// A picture of one value throughout, in the channels that a method treats each in its own way.
-void write_constant(const std::filesystem::path& path, Imf::Compression compression, int width, int height, float value,
-                    bool tiled) {
+void write_constant(const std::filesystem::path& path, Imf::Compression compression, int width,
+                    int height, float value, bool tiled) {
   Imf::Header header(width, height);
   header.compression() = compression;
   Imf::FrameBuffer pixels;
@@ -202,11 +208,13 @@ void write_constant(const std::filesystem::path& path, Imf::Compression compress
     const Imf::PixelType type = *name == 'i' ? Imf::UINT : (*name == 'Z' ? Imf::FLOAT : Imf::HALF);
     header.channels().insert(name, Imf::Channel(type));
   }
-  const std::vector<float> values(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), value);
+  const std::vector<float> values(
+      static_cast<std::size_t>(width) * static_cast<std::size_t>(height), value);
   const std::vector<Imath::half> halves(values.begin(), values.end());
   const std::vector<std::uint32_t> ids(values.size(), 7);
   const Imath::Box2i window({0, 0}, {width - 1, height - 1});
-  for (const char* name : {"R", "G", "B", "A"}) pixels.insert(name, Imf::Slice::Make(Imf::HALF, halves.data(), window));
+  for (const char* name : {"R", "G", "B", "A"})
+    pixels.insert(name, Imf::Slice::Make(Imf::HALF, halves.data(), window));
   pixels.insert("Z", Imf::Slice::Make(Imf::FLOAT, values.data(), window));
   pixels.insert("id", Imf::Slice::Make(Imf::UINT, ids.data(), window));
   if (tiled) {
@@ -229,9 +237,11 @@ TEST_F(ImageFileFormat, EveryCompressionIsReadHoweverWellItCompresses) {
         const Image image = read_exr(folder_ / "c.exr");
         ASSERT_EQ(image.channels.size(), 6u);
         for (const auto& [name, channel] : image.channels) {
-          const std::size_t count = channel.type == ChannelType::kUint
-                                        ? static_cast<std::size_t>(std::count(channel.ids.begin(), channel.ids.end(), 7u))
-                                        : static_cast<std::size_t>(std::count(channel.values.begin(), channel.values.end(), value));
+          const std::size_t count =
+              channel.type == ChannelType::kUint
+                  ? static_cast<std::size_t>(std::count(channel.ids.begin(), channel.ids.end(), 7u))
+                  : static_cast<std::size_t>(
+                        std::count(channel.values.begin(), channel.values.end(), value));
           EXPECT_EQ(count, 512u * 600u) << compression << " " << tiled << " " << name;
         }
       }
@@ -243,9 +253,12 @@ TEST_F(ImageFileFormat, WhatTheBytesCannotHoldIsRefusedForEveryCompression) {
   for (const Imf::Compression compression : kCompressions) {
     Imf::Header header(16384, 16384);
     header.compression() = compression;
-    for (const char* name : {"R", "G", "B", "A"}) header.channels().insert(name, Imf::Channel(Imf::HALF));
+    for (const char* name : {"R", "G", "B", "A"})
+      header.channels().insert(name, Imf::Channel(Imf::HALF));
     { Imf::OutputFile file((folder_ / "a.exr").c_str(), header); }
-    EXPECT_NE(error_of([&] { read_exr(folder_ / "a.exr"); }).find("too short for its size"), std::string::npos) << compression;
+    EXPECT_NE(error_of([&] { read_exr(folder_ / "a.exr"); }).find("too short for its size"),
+              std::string::npos)
+        << compression;
     // Tiles of a pixel: their table alone would take 2 GB.
     header = Imf::Header(8, 8);
     header.compression() = compression;
@@ -256,7 +269,9 @@ TEST_F(ImageFileFormat, WhatTheBytesCannotHoldIsRefusedForEveryCompression) {
     const std::string name("dataWindow\0box2i\0\x10\0\0\0", 21);
     const std::array<std::int32_t, 4> window = {0, 0, 16383, 16383};
     std::memcpy(bytes.data() + bytes.find(name) + name.size(), window.data(), 16);
-    EXPECT_NE(error_of([&] { read_exr(put("t.exr", bytes)); }).find("too short for its size"), std::string::npos) << compression;
+    EXPECT_NE(error_of([&] { read_exr(put("t.exr", bytes)); }).find("too short for its size"),
+              std::string::npos)
+        << compression;
   }
 }
 
@@ -269,7 +284,8 @@ std::size_t memory_status(const std::string& name) {
   return 0;
 }
 
-// One good chunk to which every entry of the table points, and as many bytes behind it as 2^28 pixels may come from.
+// One good chunk to which every entry of the table points, and as many bytes behind it as 2^28
+// pixels may come from.
 TEST_F(ImageFileFormat, MemoryIsUsedAsDataProveToBeThere) {
   Imf::Header header(16384, 16384);
   header.compression() = Imf::DWAB_COMPRESSION;
@@ -278,7 +294,9 @@ TEST_F(ImageFileFormat, MemoryIsUsedAsDataProveToBeThere) {
   {
     Imf::OutputFile file((folder_ / "a.exr").c_str(), header);
     Imf::FrameBuffer pixels;
-    pixels.insert("R", Imf::Slice(Imf::HALF, const_cast<char*>(reinterpret_cast<const char*>(line.data())), 2, 0));
+    pixels.insert(
+        "R",
+        Imf::Slice(Imf::HALF, const_cast<char*>(reinterpret_cast<const char*>(line.data())), 2, 0));
     file.setFrameBuffer(pixels);
     file.writePixels(256);
   }
@@ -288,7 +306,8 @@ TEST_F(ImageFileFormat, MemoryIsUsedAsDataProveToBeThere) {
   std::size_t table = 0;
   std::uint64_t chunk = 0;
   for (; chunk != table + kTableBytes; ++table) std::memcpy(&chunk, bytes.data() + table + 1, 8);
-  for (std::size_t at = table; at < table + kTableBytes; at += 8) std::memcpy(bytes.data() + at, &chunk, 8);
+  for (std::size_t at = table; at < table + kTableBytes; at += 8)
+    std::memcpy(bytes.data() + at, &chunk, 8);
   bytes.resize(bytes.size() + 100'000);
   const std::size_t before = memory_status("VmRSS");
   const std::string error = error_of([&] { read_exr(put("t.exr", bytes)); });
@@ -305,9 +324,12 @@ TEST_F(ImageFileFormat, AttributesLongerThanTheFileAreRefused) {
   const std::size_t at = bytes.find(name) + name.size();
   ASSERT_LT(at, bytes.size());
   const std::size_t before = memory_status("VmRSS");
-  for (const std::int32_t size : {std::numeric_limits<std::int32_t>::max(), static_cast<std::int32_t>(bytes.size()), -1}) {
+  for (const std::int32_t size :
+       {std::numeric_limits<std::int32_t>::max(), static_cast<std::int32_t>(bytes.size()), -1}) {
     std::memcpy(bytes.data() + at, &size, 4);
-    EXPECT_NE(error_of([&] { read_exr(put("t.exr", bytes)); }).find("an attribute passes the end of the file"),
+    EXPECT_NE(error_of([&] {
+                read_exr(put("t.exr", bytes));
+              }).find("an attribute passes the end of the file"),
               std::string::npos);
   }
   EXPECT_LT(memory_status("VmHWM"), before + 200'000'000);
@@ -322,7 +344,9 @@ TEST_F(ImageFileFormat, PicturesThatTheMachineCannotHoldAreRefusedWithNumbers) {
   ASSERT_EQ(setrlimit(RLIMIT_AS, &lower), 0);
   const std::string error = error_of([&] { read_exr(folder_ / "c.exr"); });
   ASSERT_EQ(setrlimit(RLIMIT_AS, &old), 0);
-  EXPECT_NE(error.find("c.exr: cannot read as an OpenEXR image: 2048 x 2048 pixels, 6 channels: needs 10"), std::string::npos)
+  EXPECT_NE(error.find(
+                "c.exr: cannot read as an OpenEXR image: 2048 x 2048 pixels, 6 channels: needs 10"),
+            std::string::npos)
       << error;
 }
 
@@ -355,7 +379,8 @@ TEST_F(ImageFileFormat, MultiPartDeepAndSubsampledFilesAreRefused) {
   EXPECT_NE(error_of([&] { read_exr(path); }).find("incomplete"), std::string::npos);
 
   Imf::Header many(1, 1);
-  for (int i = 0; i < 1025; ++i) many.channels().insert(std::to_string(i), Imf::Channel(Imf::FLOAT));
+  for (int i = 0; i < 1025; ++i)
+    many.channels().insert(std::to_string(i), Imf::Channel(Imf::FLOAT));
   { Imf::OutputFile file(path.c_str(), many); }
   EXPECT_NE(error_of([&] { read_exr(path); }).find("1025 channels"), std::string::npos);
 }

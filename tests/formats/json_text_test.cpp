@@ -8,7 +8,8 @@ namespace heddle {
 namespace {
 
 std::string nested(int depth) {
-  return std::string(static_cast<std::size_t>(depth), '[') + std::string(static_cast<std::size_t>(depth), ']');
+  return std::string(static_cast<std::size_t>(depth), '[') +
+         std::string(static_cast<std::size_t>(depth), ']');
 }
 
 TEST(JsonText, TheDepthIsCountedOutsideStrings) {
@@ -16,7 +17,8 @@ TEST(JsonText, TheDepthIsCountedOutsideStrings) {
   EXPECT_TRUE(is_nested_too_deeply(nested(kMaxJsonDepth + 1)));
   EXPECT_FALSE(is_nested_too_deeply("[\"" + nested(1000) + "\"]"));
   EXPECT_FALSE(is_nested_too_deeply(R"(["\"[[[", "\\"])"));
-  EXPECT_TRUE(is_nested_too_deeply("[\"\\\\\"," + nested(1000) + "]"));  // the string ends after its backslash
+  // the string ends after its backslash
+  EXPECT_TRUE(is_nested_too_deeply("[\"\\\\\"," + nested(1000) + "]"));
 }
 
 TEST(JsonText, BracketsThatCloseMakeRoom) {

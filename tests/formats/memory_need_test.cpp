@@ -21,7 +21,8 @@ TEST(MemoryNeed, WhatTheMachineCannotHoldIsRefusedWithBothNumbers) {
     require_memory(std::numeric_limits<std::uint64_t>::max(), "a picture");
     FAIL();
   } catch (const MemoryError& error) {
-    EXPECT_EQ(std::string(error.what()).find("a picture: needs 18446744073.7 GB of memory, "), 0U) << error.what();
+    EXPECT_EQ(std::string(error.what()).find("a picture: needs 18446744073.7 GB of memory, "), 0U)
+        << error.what();
   }
 }
 

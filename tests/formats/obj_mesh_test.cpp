@@ -13,7 +13,8 @@ class ObjMeshFormat : public FileFixture {
   ObjMesh read(const std::string& text) const { return read_obj(put("m.obj", text)); }
   void expect_refused(const std::string& text, const std::string& reason) const {
     const std::string error = error_of([&] { read(text); });
-    EXPECT_NE(error.find(reason), std::string::npos) << "expected: " << reason << "\nfound: " << error;
+    EXPECT_NE(error.find(reason), std::string::npos)
+        << "expected: " << reason << "\nfound: " << error;
   }
 };
 
@@ -24,7 +25,8 @@ TEST_F(ObjMeshFormat, ReadsPositionsUvsAndNormals) {
   const ObjMesh mesh = read(
       "# comment\r\nv 0 0 0 # inline\r\nv 1.5 0 0 1 0 0\nv +0 1e0 -.5\n"
       "vt 0 0\nvt 1 0 0\nvt 0 1\nvn 0 0 2\nf 1/1/1 2/2/1\t3/3/1\n");
-  EXPECT_EQ(mesh.positions, (std::vector<std::array<float, 3>>{{0, 0, 0}, {1.5f, 0, 0}, {0, 1, -0.5f}}));
+  EXPECT_EQ(mesh.positions,
+            (std::vector<std::array<float, 3>>{{0, 0, 0}, {1.5f, 0, 0}, {0, 1, -0.5f}}));
   EXPECT_EQ(mesh.uvs, (std::vector<std::array<float, 2>>{{0, 0}, {1, 0}, {0, 1}}));
   EXPECT_EQ(mesh.normals, (std::vector<std::array<float, 3>>{{0, 0, 1}, {0, 0, 1}, {0, 0, 1}}));
   EXPECT_EQ(mesh.triangles, (std::vector<Triangle>{{0, 1, 2}}));
@@ -62,7 +64,8 @@ TEST_F(ObjMeshFormat, NegativeIndicesCountBack) {
 TEST_F(ObjMeshFormat, OtherLinesAreIgnored) {
   const ObjMesh mesh =
       read("mtllib /etc/passwd\nmtllib ../../secret.mtl\no name\ng a b\ns off\nusemtl none\n" +
-           std::string(kThree) + "vw 99999999999999999999 1\nvp 0 0\nl 1 2\nunknown nonsense\n\nf 1 2 3\n");
+           std::string(kThree) +
+           "vw 99999999999999999999 1\nvp 0 0\nl 1 2\nunknown nonsense\n\nf 1 2 3\n");
   EXPECT_EQ(mesh.triangles.size(), 1u);
 }
 
@@ -87,7 +90,8 @@ TEST_F(ObjMeshFormat, NumbersMustBeFiniteAndComplete) {
        {"1e999", "-1e999", "inf", "nan", "1e39", "abc", "1.0x", "0x10", "", "--1", "+-1", "1,0"}) {
     expect_refused(std::string(kThree) + "v 0 0 " + bad + "\nf 1 2 3\n",
                    "m.obj:4: a vertex needs 3 finite numbers");
-    expect_refused(std::string(kThree) + "vt 0 " + bad + "\nf 1 2 3\n", "a texture coordinate needs 2");
+    expect_refused(std::string(kThree) + "vt 0 " + bad + "\nf 1 2 3\n",
+                   "a texture coordinate needs 2");
   }
   expect_refused(std::string(kThree) + "vn 0 0 nan\nf 1 2 3\n", "a normal needs 3");
   expect_refused(std::string(kThree) + "vn 0 0 0\nf 1 2 3\n", "normal of length 0");
@@ -122,7 +126,8 @@ TEST_F(ObjMeshFormat, EmptyMeshesAndAbsentFilesAreRefused) {
 
 TEST_F(ObjMeshFormat, EveryTruncationEndsInAMeshOrAnError) {
   const std::string text =
-      "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\nf 1/1/1 2/1/1 3/1/1 4/1/1\nf -1/-1/-1 1/1/1 "
+      "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\nf 1/1/1 2/1/1 3/1/1 4/1/1\nf -1/-1/-1 "
+      "1/1/1 "
       "2/1/1\n";
   for (std::size_t size = 0; size < text.size(); ++size) {
     try {
@@ -136,7 +141,8 @@ TEST_F(ObjMeshFormat, EveryTruncationEndsInAMeshOrAnError) {
 }
 
 TEST_F(ObjMeshFormat, CoordinatesBeyondAKilometreAreRefusedWithVertexAndLine) {
-  const std::string face = "v 0 0 0\nv 1 0 0\n# a comment\nv 0 1 %\nvt 0 0\nvt 1 0\nvt 0 @\nf 1/1 2/2 3/3\n";
+  const std::string face =
+      "v 0 0 0\nv 1 0 0\n# a comment\nv 0 1 %\nvt 0 0\nvt 1 0\nvt 0 @\nf 1/1 2/2 3/3\n";
   const auto error = [&](const std::string& z, const std::string& v, const ObjUnits& units) {
     std::string text = face;
     text.replace(text.find('@'), 1, v).replace(text.find('%'), 1, z);
@@ -151,22 +157,28 @@ TEST_F(ObjMeshFormat, CoordinatesBeyondAKilometreAreRefusedWithVertexAndLine) {
   EXPECT_EQ(error("-1e30", "1", {1000, 1}),
             "m.obj:4: vertex 3: a coordinate of -1e+33 mm; at most 1e+06 mm (1 km) either way");
   EXPECT_EQ(error("1", "-1e4", {1, 300}),
-            "m.obj:7: texture coordinate 3: a coordinate of -3e+06 mm; at most 1e+06 mm (1 km) either way");
+            "m.obj:7: texture coordinate 3: a coordinate of -3e+06 mm; at most 1e+06 mm (1 km) "
+            "either way");
   EXPECT_EQ(error("1e30", "1e30", {}), "no error") << "of unknown unit";
-  EXPECT_EQ(error("1", "1e30", {.mm_per_unit = 1}), "no error") << "a black mesh has no use for UVs";
+  EXPECT_EQ(error("1", "1e30", {.mm_per_unit = 1}), "no error")
+      << "a black mesh has no use for UVs";
 }
 
 TEST_F(ObjMeshFormat, DamagedFilesEndInAMeshOrAnError) {
-  const std::string text = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\nf 1/1/1 2/1/1 3/1/1 4/1/1\nf -1 -2 -3\n";
-  for_each_mutation(text, 1, std::string_view("\0\n /-9e#\xff", 9), [&](const std::string& damaged) {
-    try {
-      const ObjMesh mesh = read(damaged);
-      for (const Triangle& triangle : mesh.triangles) {
-        for (const std::uint32_t vertex : triangle) EXPECT_LT(vertex, mesh.positions.size());
-      }
-    } catch (const FileError&) {
-    }
-  });
+  const std::string text =
+      "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\nf 1/1/1 2/1/1 3/1/1 4/1/1\nf -1 -2 "
+      "-3\n";
+  for_each_mutation(text, 1, std::string_view("\0\n /-9e#\xff", 9),
+                    [&](const std::string& damaged) {
+                      try {
+                        const ObjMesh mesh = read(damaged);
+                        for (const Triangle& triangle : mesh.triangles) {
+                          for (const std::uint32_t vertex : triangle)
+                            EXPECT_LT(vertex, mesh.positions.size());
+                        }
+                      } catch (const FileError&) {
+                      }
+                    });
 }
 
 }  // namespace

@@ -26,7 +26,8 @@ class TensorFileFormat : public FileFixture {
     const auto path = put_tensors(header, data);
     return error_of([&] { TensorFile::read(path); });
   }
-  void expect_refused(const std::string& header, const std::string& data, const std::string& reason) const {
+  void expect_refused(const std::string& header, const std::string& data,
+                      const std::string& reason) const {
     EXPECT_NE(error_for(header, data).find(reason), std::string::npos)
         << "expected: " << reason << "\nfound: " << error_for(header, data);
   }
@@ -83,7 +84,8 @@ TEST_F(TensorFileFormat, RoundTripOfEveryType) {
   EXPECT_EQ(file.get<std::uint8_t>("u8", {3}), u8);
   EXPECT_EQ(file.get<std::uint16_t>("u16", {2, 1}), u16);
   EXPECT_EQ(file.get<std::uint32_t>("u32", {1, 2}), u32);
-  EXPECT_EQ(file.get<std::uint64_t>("u64", {0}), u64) << "a zero in the asked shape matches any extent";
+  EXPECT_EQ(file.get<std::uint64_t>("u64", {0}), u64)
+      << "a zero in the asked shape matches any extent";
   EXPECT_EQ(file.get<std::int32_t>("i32", {3}), i32);
   const std::vector<Half> halves = file.get<Half>("f16", {2});
   for (std::size_t i = 0; i < 2; ++i) EXPECT_EQ(halves[i].bits, f16[i].bits);
@@ -94,7 +96,8 @@ TEST_F(TensorFileFormat, RoundTripOfEveryType) {
   EXPECT_EQ(file.shape("nothing"), (std::vector<std::uint64_t>{0, 7}));
   EXPECT_EQ(file.metadata_value("\xC3\xA9"), "");
   EXPECT_EQ(file.entries().size(), 10u);
-  // Each tensor starts at a multiple of its element size, given that the data start at a multiple of 8.
+  // Each tensor starts at a multiple of its element size, given that the data start at a multiple
+  // of 8.
   for (const auto& [name, size] : std::map<std::string, std::size_t>{
            {"u16", 2}, {"u32", 4}, {"u64", 8}, {"i32", 4}, {"f16", 2}, {"f32", 4}, {"f64", 8}}) {
     EXPECT_EQ(file.entries().at(name).begin % size, 0u) << name;
@@ -142,8 +145,9 @@ TEST_F(TensorFileFormat, EveryTruncationIsRefused) {
     const auto path = put("t", bytes.substr(0, size));
     EXPECT_NE(error_of([&] { TensorFile::read(path); }), "no error") << size;
   }
-  EXPECT_NE(error_of([&] { TensorFile::read(put("t", bytes + '\0')); }).find("the header describes"),
-            std::string::npos);
+  EXPECT_NE(
+      error_of([&] { TensorFile::read(put("t", bytes + '\0')); }).find("the header describes"),
+      std::string::npos);
 }
 
 TEST_F(TensorFileFormat, FlippedHeaderBytesAreRefusedOrShow) {
@@ -164,8 +168,8 @@ TEST_F(TensorFileFormat, FlippedHeaderBytesAreRefusedOrShow) {
       try {
         const TensorFile file = TensorFile::read(path);
         EXPECT_TRUE(in_string) << "byte " << at << " mask " << mask;
-        bool differs =
-            file.metadata() != original.metadata() || file.entries().size() != original.entries().size();
+        bool differs = file.metadata() != original.metadata() ||
+                       file.entries().size() != original.entries().size();
         for (const auto& [name, entry] : original.entries()) {
           const auto it = file.entries().find(name);
           differs = differs || it == file.entries().end() || it->second.type != entry.type;
@@ -198,19 +202,23 @@ TEST_F(TensorFileFormat, NamesAreAtMost10000AndReadFast) {
   const auto header = [](int names) {
     std::string text = "{\"__metadata__\":{}";
     for (int k = 1; k < names; ++k) {
-      text += ",\"t" + std::to_string(k) + "\":{\"dtype\":\"U8\",\"shape\":[0],\"data_offsets\":[0,0]}";
+      text +=
+          ",\"t" + std::to_string(k) + "\":{\"dtype\":\"U8\",\"shape\":[0],\"data_offsets\":[0,0]}";
     }
     return text + "}";
   };
   EXPECT_EQ(TensorFile::read(put_tensors(header(10'000), "")).entries().size(), 9'999u);
   const std::string problem = "more than 10000 names in one object";
-  EXPECT_NE(error_of([&] { TensorFile::read(put_tensors(header(10'001), "")); }).find(problem), std::string::npos);
+  EXPECT_NE(error_of([&] { TensorFile::read(put_tensors(header(10'001), "")); }).find(problem),
+            std::string::npos);
   // Half a million: refused at the first too many.
-  EXPECT_NE(error_of([&] { TensorFile::read(put_tensors(header(500'000), "")); }).find(problem), std::string::npos);
+  EXPECT_NE(error_of([&] { TensorFile::read(put_tensors(header(500'000), "")); }).find(problem),
+            std::string::npos);
 }
 
 TEST_F(TensorFileFormat, HostileHeadersAreRefusedWithTheirReason) {
-  const auto entry = [](const std::string& dtype, const std::string& shape, const std::string& offsets) {
+  const auto entry = [](const std::string& dtype, const std::string& shape,
+                        const std::string& offsets) {
     return "{\"dtype\":" + dtype + ",\"shape\":" + shape + ",\"data_offsets\":" + offsets + "}";
   };
   const std::string u8 = "\"U8\"";
@@ -224,12 +232,13 @@ TEST_F(TensorFileFormat, HostileHeadersAreRefusedWithTheirReason) {
   expect_refused("{\"a\":" + std::string(100000, '['), "", "nested too deeply");
   expect_refused("{\"a\":1}", "", "\"a\": its keys must be");
   expect_refused("{\"a\":{\"dtype\":\"U8\",\"shape\":[1]}}", "x", "its keys must be");
-  expect_refused("{\"a\":{\"dtype\":\"U8\",\"shape\":[1],\"offsets\":[0,1]}}", "x", "its keys must be");
+  expect_refused("{\"a\":{\"dtype\":\"U8\",\"shape\":[1],\"offsets\":[0,1]}}", "x",
+                 "its keys must be");
   // Repeated keys, on each level.
   const std::string x = entry(u8, "[1]", "[0,1]");
   expect_refused("{\"x\":" + x + ",\"x\":" + x + "}", "x", "\"x\" occurs twice");
-  expect_refused("{\"x\":{\"dtype\":\"U8\",\"shape\":[1],\"shape\":[1],\"data_offsets\":[0,1]}}", "x",
-                 "\"shape\" occurs twice");
+  expect_refused("{\"x\":{\"dtype\":\"U8\",\"shape\":[1],\"shape\":[1],\"data_offsets\":[0,1]}}",
+                 "x", "\"shape\" occurs twice");
   expect_refused("{\"__metadata__\":{\"k\":\"a\",\"k\":\"b\"}}", "", "\"k\" occurs twice");
   expect_refused("{\"__metadata__\":{\"k\":1}}", "", "\"k\" is not a string");
   expect_refused("{\"__metadata__\":[]}", "", "not an object");
@@ -239,24 +248,31 @@ TEST_F(TensorFileFormat, HostileHeadersAreRefusedWithTheirReason) {
   expect_refused("{\"x\":" + entry("1", "[1]", "[0,1]") + "}", "x", "unsupported dtype 1");
   expect_refused("{\"x\":" + entry(u8, "[-1]", "[0,1]") + "}", "x", "natural numbers");
   expect_refused("{\"x\":" + entry(u8, "[1.0]", "[0,1]") + "}", "x", "natural numbers");
-  expect_refused("{\"x\":" + entry(u8, "[18446744073709551616]", "[0,1]") + "}", "x", "natural numbers");
+  expect_refused("{\"x\":" + entry(u8, "[18446744073709551616]", "[0,1]") + "}", "x",
+                 "natural numbers");
   expect_refused("{\"x\":" + entry(u8, "1", "[0,1]") + "}", "x", "natural numbers");
   expect_refused("{\"x\":" + entry(u8, "[1]", "[0,1,2]") + "}", "x", "pair of natural numbers");
   expect_refused("{\"x\":" + entry(u8, "[1]", "[-1,0]") + "}", "x", "pair of natural numbers");
-  // Products past 64 bits: 2^63 halves; and one that wraps round to exactly the number of bytes present.
-  expect_refused("{\"x\":" + entry("\"F16\"", "[9223372036854775808]", "[0,0]") + "}", "", "overflows");
+  // Products past 64 bits: 2^63 halves; and one that wraps round to exactly the number of bytes
+  // present.
+  expect_refused("{\"x\":" + entry("\"F16\"", "[9223372036854775808]", "[0,0]") + "}", "",
+                 "overflows");
   expect_refused("{\"x\":" + entry(u8, "[4294967296,4294967296]", "[0,0]") + "}", "", "overflows");
-  expect_refused("{\"x\":" + entry(u8, "[4294967296,4294967296,0]", "[0,0]") + "}", "", "overflows");
+  expect_refused("{\"x\":" + entry(u8, "[4294967296,4294967296,0]", "[0,0]") + "}", "",
+                 "overflows");
   // Extents.
-  expect_refused("{\"x\":" + entry(u8, "[2]", "[0,1]") + "}", "x", "needs 2 bytes, data_offsets give 1");
+  expect_refused("{\"x\":" + entry(u8, "[2]", "[0,1]") + "}", "x",
+                 "needs 2 bytes, data_offsets give 1");
   expect_refused("{\"x\":" + entry(u8, "[1]", "[1,0]") + "}", "x", "pass the end");
   expect_refused("{\"x\":" + entry(u8, "[9]", "[0,9]") + "}", "x", "pass the end");
-  expect_refused("{\"x\":" + entry(u8, "[1]", "[18446744073709551615,18446744073709551615]") + "}", "x",
-                 "pass the end");
+  expect_refused("{\"x\":" + entry(u8, "[1]", "[18446744073709551615,18446744073709551615]") + "}",
+                 "x", "pass the end");
   expect_refused("{\"x\":" + x + ",\"y\":" + x + "}", "xy", "overlap at data byte 0");
-  expect_refused("{\"x\":" + entry(u8, "[2]", "[0,2]") + ",\"y\":" + entry(u8, "[2]", "[1,3]") + "}", "xyz",
-                 "overlap at data byte 1");
-  expect_refused("{\"x\":" + x + ",\"y\":" + entry(u8, "[1]", "[2,3]") + "}", "xyz", "hole at data byte 2");
+  expect_refused(
+      "{\"x\":" + entry(u8, "[2]", "[0,2]") + ",\"y\":" + entry(u8, "[2]", "[1,3]") + "}", "xyz",
+      "overlap at data byte 1");
+  expect_refused("{\"x\":" + x + ",\"y\":" + entry(u8, "[1]", "[2,3]") + "}", "xyz",
+                 "hole at data byte 2");
   expect_refused("{\"x\":" + entry(u8, "[1]", "[1,2]") + "}", "xy", "hole at data byte 1");
   expect_refused("{\"x\":" + x + "}", "xy", "2 bytes of data, the header describes 1");
 }
@@ -264,7 +280,8 @@ TEST_F(TensorFileFormat, HostileHeadersAreRefusedWithTheirReason) {
 TEST_F(TensorFileFormat, GetNamesWhatDoesNotFit) {
   const TensorFile file = TensorFile::read(write_sample(folder_ / "a"));
   const auto error = [&](auto function) { return error_of(function); };
-  EXPECT_NE(error([&] { file.get<float>("absent", {}); }).find("no tensor \"absent\""), std::string::npos);
+  EXPECT_NE(error([&] { file.get<float>("absent", {}); }).find("no tensor \"absent\""),
+            std::string::npos);
   EXPECT_NE(error([&] { file.shape("absent"); }).find("no tensor \"absent\""), std::string::npos);
   EXPECT_NE(error([&] {
               file.get<double>("weights", {2, 3});
@@ -278,7 +295,8 @@ TEST_F(TensorFileFormat, GetNamesWhatDoesNotFit) {
   EXPECT_NE(error([&] { file.get<float>("weights", {2, 3, 1}); }), "no error");
   EXPECT_EQ(file.get<float>("weights", {0, 3}).size(), 6u);
   EXPECT_EQ(file.metadata_value("key"), "a \"quoted\" \\ line\n");
-  EXPECT_NE(error([&] { file.metadata_value("absent"); }).find("no metadata \"absent\""), std::string::npos);
+  EXPECT_NE(error([&] { file.metadata_value("absent"); }).find("no metadata \"absent\""),
+            std::string::npos);
   EXPECT_EQ(file.path(), folder_ / "a");
 }
 
@@ -306,7 +324,8 @@ TEST_F(TensorFileFormat, NonFiniteValuesAreRefused) {
 TEST_F(TensorFileFormat, TextThatIsNotUtf8IsAnError) {
   TensorFileWriter writer;
   writer.set_metadata("k", "\xff");
-  EXPECT_NE(error_of([&] { writer.write(folder_ / "t"); }).find("not valid UTF-8"), std::string::npos);
+  EXPECT_NE(error_of([&] { writer.write(folder_ / "t"); }).find("not valid UTF-8"),
+            std::string::npos);
   EXPECT_EQ(file_count(), 0u);
 }
 
@@ -322,7 +341,8 @@ TEST(HalfLaw, EveryHalfSurvivesTheTripThroughFloat) {
 }
 
 TEST(HalfLaw, RoundsToNearestEven) {
-  // Halves in [2^e, 2^(e+1)) are multiples of 2^(e-10), below 2^-14 of 2^-24; nearbyint rounds ties to even.
+  // Halves in [2^e, 2^(e+1)) are multiples of 2^(e-10), below 2^-14 of 2^-24; nearbyint rounds ties
+  // to even.
   std::mt19937 random(1);
   std::uniform_real_distribution<float> exponent(-26.0f, 15.99f);
   for (int i = 0; i < 200000; ++i) {

@@ -135,7 +135,8 @@ TEST(TomlTableTest, WrongTypesSayWhatWasExpectedAndFound) {
             "dir/f.toml:3:5: 'c': expected an array of 3 numbers, found an array of 2");
   EXPECT_EQ(first_line([&] { t.boolean("d"); }),
             "dir/f.toml:4:5: 'd': expected true or false, found a date or time");
-  EXPECT_EQ(first_line([&] { t.string("e"); }), "dir/f.toml:5:1: 'e': expected a string, found a table");
+  EXPECT_EQ(first_line([&] { t.string("e"); }),
+            "dir/f.toml:5:1: 'e': expected a string, found a table");
   EXPECT_EQ(first_line([&] { t.table("a"); }),
             "dir/f.toml:1:5: 'a': expected a table, found the boolean true");
   EXPECT_EQ(first_line([&] { t.tables("e"); }),
@@ -148,14 +149,18 @@ TEST(TomlTableTest, RangesAreClosedUnlessSaidOtherwise) {
   const TomlTable t = parse("zero = 0\none = 1.0\nbelow = -1e-300\nv = [0, 2, 0]\n");
   EXPECT_EQ(t.number("zero", {0, 1}), 0);
   EXPECT_EQ(t.number("one", {0, 1}), 1);
-  EXPECT_NE(message_of([&] { t.number("zero", {0, 1, true}); }).find("in (0, 1]"), std::string::npos);
+  EXPECT_NE(message_of([&] {
+              t.number("zero", {0, 1, true});
+            }).find("in (0, 1]"),
+            std::string::npos);
   EXPECT_NE(message_of([&] { t.number("below", {.min = 0}); }).find("a number >= 0, found"),
             std::string::npos);
   EXPECT_NE(message_of([&] { t.number("one", {.max = 0.5}); }).find("a number <= 0.5, found"),
             std::string::npos);
-  EXPECT_NE(
-      message_of([&] { t.number("zero", {.min = 0, .exclusive_min = true}); }).find("a number > 0, found"),
-      std::string::npos);
+  EXPECT_NE(message_of([&] {
+              t.number("zero", {.min = 0, .exclusive_min = true});
+            }).find("a number > 0, found"),
+            std::string::npos);
   EXPECT_EQ(message_of([&] { t.number3("v", {0, 1}); }).substr(0, 16), "dir/f.toml:4:9: ");
   EXPECT_NE(message_of([&] {
               t.integer("zero", 1, std::numeric_limits<std::int64_t>::max());
@@ -169,24 +174,26 @@ TEST(TomlTableTest, NonFiniteNumbersAreRefusedWithTheirPlace) {
     EXPECT_EQ(message.substr(0, 15), "dir/f.toml:1:5:") << message;
     EXPECT_NE(message.find("finite"), std::string::npos) << message;
   }
-  EXPECT_EQ(message_of([] { parse("k = [0, inf, 1]").number3("k", {}); }).substr(0, 15), "dir/f.toml:1:9:");
+  EXPECT_EQ(message_of([] { parse("k = [0, inf, 1]").number3("k", {}); }).substr(0, 15),
+            "dir/f.toml:1:9:");
   EXPECT_NE(message_of([] { parse("k = inf").optional_number("k", {}); }), "no error");
 }
 
 TEST(TomlTableTest, MissingKeyNamesKeyUnitAndTable) {
   const TomlTable warp = parse(kFabric).table("yarn").table("warp");
-  EXPECT_EQ(
-      message_of([&] {
-        warp.number("pitch_mm", {0, 9, true});
-      }),
-      "dir/f.toml:4:1: missing key 'pitch_mm' in [yarn.warp]: expected a number in (0, 9], in millimetres\n"
-      "  [yarn.warp]\n"
-      "  ^");
+  EXPECT_EQ(message_of([&] {
+              warp.number("pitch_mm", {0, 9, true});
+            }),
+            "dir/f.toml:4:1: missing key 'pitch_mm' in [yarn.warp]: expected a number in (0, 9], "
+            "in millimetres\n"
+            "  [yarn.warp]\n"
+            "  ^");
   EXPECT_EQ(message_of([&] { parse("\nx = 1\n").table("weave"); }).substr(0, 74),
             "dir/f.toml:1:1: missing key 'weave' at the top level: expected a table\n  \n");
   // In an array of tables the place is the element's own header.
-  EXPECT_EQ(message_of([] { parse(kFabric).tables("light")[1].string("kind"); }),
-            "dir/f.toml:10:1: missing key 'kind' in [[light]]: expected a string\n  [[light]]\n  ^");
+  EXPECT_EQ(
+      message_of([] { parse(kFabric).tables("light")[1].string("kind"); }),
+      "dir/f.toml:10:1: missing key 'kind' in [[light]]: expected a string\n  [[light]]\n  ^");
   EXPECT_NE(message_of([] {
               parse("raduis_um = 3\n").number("radius_um", {});
             }).find("is 'raduis_um' on line 1 meant for it?"),
@@ -194,27 +201,30 @@ TEST(TomlTableTest, MissingKeyNamesKeyUnitAndTable) {
 }
 
 TEST(TomlTableTest, WrongUnitPointsAtTheKeyAndNamesTheExpectedOne) {
+  EXPECT_EQ(message_of([] {
+              parse("[a]\nradius_mm = 1\n").table("a").number("radius_um", {0, 9});
+            }),
+            "dir/f.toml:2:1: wrong unit: the expected key is 'radius_um' (a number in [0, 9], in "
+            "micrometres), "
+            "found 'radius_mm'\n  radius_mm = 1\n  ^");
+  EXPECT_NE(message_of([] {
+              parse("radius = 1\n").number("radius_um", {});
+            }).find("expected key is 'radius_um'"),
+            std::string::npos);
+  // The same for a key that has a default, found by finish().
   EXPECT_EQ(
       message_of([] {
-        parse("[a]\nradius_mm = 1\n").table("a").number("radius_um", {0, 9});
+        const TomlTable t = parse("radius_mm = 1\n");
+        t.number("radius_um", {}, 3.0);
+        t.finish();
       }),
-      "dir/f.toml:2:1: wrong unit: the expected key is 'radius_um' (a number in [0, 9], in micrometres), "
-      "found 'radius_mm'\n  radius_mm = 1\n  ^");
-  EXPECT_NE(
-      message_of([] { parse("radius = 1\n").number("radius_um", {}); }).find("expected key is 'radius_um'"),
-      std::string::npos);
-  // The same for a key that has a default, found by finish().
-  EXPECT_EQ(message_of([] {
-              const TomlTable t = parse("radius_mm = 1\n");
-              t.number("radius_um", {}, 3.0);
-              t.finish();
-            }),
-            "dir/f.toml:1:1: unknown key 'radius_mm' at the top level; wrong unit: the expected key is "
-            "'radius_um'\n"
-            "  radius_mm = 1\n  ^");
+      "dir/f.toml:1:1: unknown key 'radius_mm' at the top level; wrong unit: the expected key is "
+      "'radius_um'\n"
+      "  radius_mm = 1\n  ^");
   // Another quantity with another unit is not the same key.
-  EXPECT_NE(message_of([] { parse("length_mm = 1\n").number("radius_um", {}); }).find("missing key"),
-            std::string::npos);
+  EXPECT_NE(
+      message_of([] { parse("length_mm = 1\n").number("radius_um", {}); }).find("missing key"),
+      std::string::npos);
 }
 
 TEST(TomlTableTest, FinishFindsTheFirstUnknownKeyInFileOrder) {
@@ -259,7 +269,8 @@ TEST(TomlTableTest, UnknownKeySuggestsTheNearest) {
   EXPECT_NE(message("glos = 1\n").find("did you mean 'gloss'?"), std::string::npos);
   EXPECT_NE(message("glsos = 1\n").find("did you mean 'gloss'?"), std::string::npos);
   EXPECT_NE(message("twsit_per_mm = 1\n").find("did you mean 'twist_per_mm'?"), std::string::npos);
-  EXPECT_NE(message("twist_per_cm = 1\n").find("the expected key is 'twist_per_mm'"), std::string::npos);
+  EXPECT_NE(message("twist_per_cm = 1\n").find("the expected key is 'twist_per_mm'"),
+            std::string::npos);
   EXPECT_NE(message("colour = 1\n").find("known here: gloss, twist_per_mm"), std::string::npos);
 }
 
@@ -297,9 +308,11 @@ std::string repeated(const std::string& text, int count) {
 TEST(TomlTableTest, TablesAndArraysWithinEachOtherAreAtMost64) {
   const auto place = [](const std::string& text) {
     const std::string message = message_of([&] { parse(text).canonical_text(); });
-    return message.substr(0, message.find(": syntax: more than 64 tables and arrays within each other"));
+    return message.substr(
+        0, message.find(": syntax: more than 64 tables and arrays within each other"));
   };
-  // Each form at the limit, and one deeper: the place is that of the dot or bracket that goes too deep.
+  // Each form at the limit, and one deeper: the place is that of the dot or bracket that goes too
+  // deep.
   EXPECT_EQ(place("a" + repeated(".a", 64) + " = 1\n"), "no error");
   EXPECT_EQ(place("a" + repeated(".a", 65) + " = 1\n"), "dir/f.toml:1:130");
   EXPECT_EQ(place("[a" + repeated(".a", 63) + "]\n"), "no error");
@@ -312,7 +325,8 @@ TEST(TomlTableTest, TablesAndArraysWithinEachOtherAreAtMost64) {
   EXPECT_EQ(place("a = " + repeated("{a=", 65) + "1" + repeated("}", 65)), "dir/f.toml:1:197");
   // Headers, keys, inline tables and arrays add up.
   const std::string header = "[h" + repeated(".h", 29) + "]\n";
-  EXPECT_EQ(place(header + "k" + repeated(".k", 10) + " = [{x" + repeated(".x", 22) + " = 1}]\n"), "no error");
+  EXPECT_EQ(place(header + "k" + repeated(".k", 10) + " = [{x" + repeated(".x", 22) + " = 1}]\n"),
+            "no error");
   EXPECT_EQ(place(header + "k" + repeated(".k", 10) + " = [{x" + repeated(".x", 23) + " = 1}]\n"),
             "dir/f.toml:2:72");
   EXPECT_EQ(place(header + "k = 1\n[b]\nk" + repeated(".k", 63) + " = 1\n"), "no error");
@@ -320,11 +334,13 @@ TEST(TomlTableTest, TablesAndArraysWithinEachOtherAreAtMost64) {
 
 TEST(TomlTableTest, DepthIsRefusedBeforeItIsBuilt) {
   for (const int depth : {30'000, 100'000}) {
-    for (const std::string& text : {"a" + repeated(".a", depth) + " = 1", "[a" + repeated(".a", depth) + "]",
-                                    "[[a" + repeated(".a", depth) + "]]", "a = {a" + repeated(".a", depth) + " = 1}",
-                                    "a = " + repeated("[", depth), "a = " + repeated("{a.b = [", depth)}) {
+    for (const std::string& text :
+         {"a" + repeated(".a", depth) + " = 1", "[a" + repeated(".a", depth) + "]",
+          "[[a" + repeated(".a", depth) + "]]", "a = {a" + repeated(".a", depth) + " = 1}",
+          "a = " + repeated("[", depth), "a = " + repeated("{a.b = [", depth)}) {
       const std::string message = message_of([&] { parse(text); });
-      EXPECT_NE(message.find("more than 64 tables and arrays within each other"), std::string::npos) << message;
+      EXPECT_NE(message.find("more than 64 tables and arrays within each other"), std::string::npos)
+          << message;
       EXPECT_LT(message.size(), 400u) << "an excerpt, not the whole line";
     }
   }
@@ -334,12 +350,15 @@ TEST(TomlTableTest, WhatOnlyLooksNestedIsNot) {
   const std::string dots = repeated(".", 500);
   const std::string brackets = repeated("[{", 500);
   for (const std::string& text :
-       {"# " + dots + brackets + "\na = 1 # " + brackets, "a = \"" + dots + brackets + "\\\"" + brackets + "\"",
-        "a = '" + brackets + "\\'  # '" + brackets, "a = \"\"\"\n" + brackets + "\"\"\\\"\"\"" + brackets + "\"\"\"\"\"",
+       {"# " + dots + brackets + "\na = 1 # " + brackets,
+        "a = \"" + dots + brackets + "\\\"" + brackets + "\"",
+        "a = '" + brackets + "\\'  # '" + brackets,
+        "a = \"\"\"\n" + brackets + "\"\"\\\"\"\"" + brackets + "\"\"\"\"\"",
         "a = \'\'\'\n" + brackets + "''\n\'\'\'\'\'", "\"" + dots + "\".'" + brackets + "' = 1",
         "[\"" + dots + "\".'" + brackets + "']", "a = [" + repeated("1.5, ", 500) + "]",
-        "a = [\n" + repeated("{x.y = 1.5}, # [[\n", 500) + "]", std::string("a = {x.y = 1.5, x.z = 2.5}"),
-        repeated("[[a.b]]\nk.l = 07:32:00.999\n", 500), repeated("[[a.b]]\nk = [[1.5], [2.5]]\n", 500)}) {
+        "a = [\n" + repeated("{x.y = 1.5}, # [[\n", 500) + "]",
+        std::string("a = {x.y = 1.5, x.z = 2.5}"), repeated("[[a.b]]\nk.l = 07:32:00.999\n", 500),
+        repeated("[[a.b]]\nk = [[1.5], [2.5]]\n", 500)}) {
     EXPECT_EQ(message_of([&] { parse(text); }), "no error") << text.substr(0, 60);
   }
 }
@@ -349,25 +368,32 @@ TEST(TomlTableTest, LongLinesAreQuotedInPart) {
   EXPECT_EQ(message_of([&] { parse("k = " + long_text).number("k", {}); }),
             "dir/f.toml:1:5: 'k': expected a number, found the string \"" + std::string(40, 'x') +
                 "...\"\n  k = '" + std::string(115, 'x') + "...\n      ^");
-  EXPECT_EQ(message_of([&] { parse("a = [" + long_text + ", " + long_text + ", 3]").numbers("a", {}, 0, 2); })
-                .substr(0, 16),
+  EXPECT_EQ(message_of([&] {
+              parse("a = [" + long_text + ", " + long_text + ", 3]").numbers("a", {}, 0, 2);
+            }).substr(0, 16),
             "dir/f.toml:1:5: ");
-  EXPECT_EQ(message_of([&] { parse("t = {a = " + long_text + ", b = 2, c = " + long_text + "}").table("t").string("b"); }),
-            "dir/f.toml:1:518: 'b': expected a string, found the integer 2\n  ..." + std::string(53, 'x') +
-                "', b = 2, c = '" + std::string(52, 'x') + "...\n     " + std::string(60, ' ') + "^");
+  EXPECT_EQ(
+      message_of([&] {
+        parse("t = {a = " + long_text + ", b = 2, c = " + long_text + "}").table("t").string("b");
+      }),
+      "dir/f.toml:1:518: 'b': expected a string, found the integer 2\n  ..." +
+          std::string(53, 'x') + "', b = 2, c = '" + std::string(52, 'x') + "...\n     " +
+          std::string(60, ' ') + "^");
   // A long name in titles, and in the message about itself.
   const std::string name(100'000, 'n');
   std::string text = "[" + name + "]\n";
   for (int k = 0; k < 10'000; ++k) text.append("k").append(std::to_string(k)).append(" = {}\n");
   const std::string message = message_of([&] { parse(text).finish(); });
-  EXPECT_NE(message.find("unknown key '" + name.substr(0, 40) + "...'"), std::string::npos) << message.substr(0, 300);
+  EXPECT_NE(message.find("unknown key '" + name.substr(0, 40) + "...'"), std::string::npos)
+      << message.substr(0, 300);
   EXPECT_LT(message.size(), 400u);
 }
 
 TEST(TomlTableTest, DocumentsAreAtMostOneMebibyte) {
   const auto of_size = [](std::size_t size) { return std::string(size - 1, ' ') + "\n"; };
   EXPECT_EQ(message_of([&] { parse(of_size(1 << 20)); }), "no error");
-  EXPECT_EQ(message_of([&] { parse(of_size((1 << 20) + 1)); }), "dir/f.toml: 1048577 bytes; a config has at most 1048576");
+  EXPECT_EQ(message_of([&] { parse(of_size((1 << 20) + 1)); }),
+            "dir/f.toml: 1048577 bytes; a config has at most 1048576");
   // The size alone is asked of a file, nothing is read: this one is sparse.
   const auto path = std::filesystem::path(testing::TempDir()) / "toml_table_sparse.toml";
   std::ofstream(path) << "";
@@ -385,7 +411,8 @@ TEST(TomlTableTest, ControlCharactersDoNotReachTheTerminal) {
 TEST(TomlTableTest, UnreadableFileIsAConfigError) {
   EXPECT_EQ(message_of([] { TomlTable::load("/nonexistent/f.toml"); }),
             "/nonexistent/f.toml: cannot open: No such file or directory");
-  EXPECT_NE(message_of([] { TomlTable::load(std::filesystem::temp_directory_path()); }), "no error");
+  EXPECT_NE(message_of([] { TomlTable::load(std::filesystem::temp_directory_path()); }),
+            "no error");
 }
 
 TEST(TomlTableTest, FilesAreRelativeToTheDocument) {
@@ -398,7 +425,8 @@ TEST(TomlTableTest, FilesAreRelativeToTheDocument) {
   EXPECT_EQ(t.document_name(), (folder / "scene.toml").string());
   EXPECT_EQ(t.existing_file("mesh"), folder / "meshes/a.obj");
   const std::string message = message_of([&] { t.existing_file("other"); });
-  EXPECT_NE(message.find("scene.toml:2:9: 'other': there is no file '"), std::string::npos) << message;
+  EXPECT_NE(message.find("scene.toml:2:9: 'other': there is no file '"), std::string::npos)
+      << message;
   EXPECT_NE(message_of([&] { t.existing_file("folder"); }).find(":3:10:"), std::string::npos);
 }
 
@@ -438,10 +466,11 @@ TEST(TomlTableTest, AskedKeysDescribeTheReader) {
 }
 
 TEST(TomlTableTest, CanonicalTextDependsOnContentOnly) {
-  const std::string text = parse("b = 1.0\na = \"q\\\"\\n\"\n[t]\ny = [1, 0x10]\nx = 0.1\n").canonical_text();
+  const std::string text =
+      parse("b = 1.0\na = \"q\\\"\\n\"\n[t]\ny = [1, 0x10]\nx = 0.1\n").canonical_text();
   EXPECT_EQ(text, R"({"a":"q\"\u000a","b":1,"t":{"x":0.1,"y":[1,16]}})");
-  EXPECT_EQ(text,
-            parse("# comment\nt.y = [ 1,\n  16 ]\na = '''\nq\"\n'''\nb = 1\nt.x = 1e-1\n").canonical_text());
+  EXPECT_EQ(text, parse("# comment\nt.y = [ 1,\n  16 ]\na = '''\nq\"\n'''\nb = 1\nt.x = 1e-1\n")
+                      .canonical_text());
   for (const char* other : {"b = 1.0\na = \"q\\\"\\n\"\n[t]\ny = [16, 1]\nx = 0.1\n",
                             "b = 1.0\na = \"q\\\"\\n\"\n[t]\ny = [1, 16]\nx = 0.1000000000000001\n",
                             "b = true\na = \"q\\\"\\n\"\n[t]\ny = [1, 16]\nx = 0.1\n",
@@ -453,18 +482,20 @@ TEST(TomlTableTest, CanonicalTextDependsOnContentOnly) {
 }
 
 TEST(TomlTableTest, DamagedDocumentsEndInValuesOrAnErrorWithItsPlace) {
-  const std::string whole = std::string(kFabric) + "t = {a.b = \"\"\"x\"\"\", c = [[1.5], ['y']]} # end\n";
+  const std::string whole =
+      std::string(kFabric) + "t = {a.b = \"\"\"x\"\"\", c = [[1.5], ['y']]} # end\n";
   int damaged = 0;
-  for_each_mutation(whole, 1, std::string_view("\0\n\"'[]{}.,=#\\\xff", 14), [&](const std::string& text) {
-    const std::string message = message_of([&] {
-      const TomlTable t = parse(text);
-      EXPECT_FALSE(t.canonical_text().empty());
-      t.finish();
-    });
-    const bool holds_nothing = text.find_first_not_of("# abcfir\n") == std::string::npos;
-    EXPECT_EQ(message.substr(0, 11), holds_nothing ? "no error" : "dir/f.toml:") << text;
-    ++damaged;
-  });
+  for_each_mutation(
+      whole, 1, std::string_view("\0\n\"'[]{}.,=#\\\xff", 14), [&](const std::string& text) {
+        const std::string message = message_of([&] {
+          const TomlTable t = parse(text);
+          EXPECT_FALSE(t.canonical_text().empty());
+          t.finish();
+        });
+        const bool holds_nothing = text.find_first_not_of("# abcfir\n") == std::string::npos;
+        EXPECT_EQ(message.substr(0, 11), holds_nothing ? "no error" : "dir/f.toml:") << text;
+        ++damaged;
+      });
   EXPECT_GT(damaged, 2000);
 }
 

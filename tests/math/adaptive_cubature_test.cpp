@@ -8,8 +8,9 @@ namespace heddle {
 namespace {
 
 TEST(AdaptiveCubature, PolynomialsAreExact) {
-  const Rgbd value = integrate_rectangle(
-      -1, 2, 1, 3, {}, [](double x, double y) { return Rgbd(1, x * x * y, std::pow(x, 5) * std::pow(y, 4)); });
+  const Rgbd value = integrate_rectangle(-1, 2, 1, 3, {}, [](double x, double y) {
+    return Rgbd(1, x * x * y, std::pow(x, 5) * std::pow(y, 4));
+  });
   EXPECT_NEAR(value[0], 6, 1e-13);
   EXPECT_NEAR(value[1], 3 * 4, 1e-12);
   EXPECT_NEAR(value[2], (64 - 1) / 6. * (243 - 1) / 5., 1e-10);
@@ -34,7 +35,8 @@ TEST(AdaptiveCubature, FindsAFeatureOfTheSizeOfItsFirstCells) {
   settings.rows = settings.columns = 10;
   const double width = .03;
   const Rgbd value = integrate_rectangle(0, 1, 0, 1, settings, [&](double x, double y) {
-    return Rgbd::Constant(std::exp(-.5 * (std::pow(x - .412, 2) + std::pow(y - .733, 2)) / (width * width)));
+    return Rgbd::Constant(
+        std::exp(-.5 * (std::pow(x - .412, 2) + std::pow(y - .733, 2)) / (width * width)));
   });
   EXPECT_NEAR(value[0] / (2 * kPi * width * width), 1, 1e-4);
 }

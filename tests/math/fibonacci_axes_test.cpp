@@ -6,7 +6,8 @@ namespace heddle {
 namespace {
 
 TEST(FibonacciAxes, UnitVectorsWithinTheirDomain) {
-  for (FibonacciSet set : {FibonacciSet::kPrinted, FibonacciSet::kHemisphere, FibonacciSet::kSphere}) {
+  for (FibonacciSet set :
+       {FibonacciSet::kPrinted, FibonacciSet::kHemisphere, FibonacciSet::kSphere}) {
     const std::vector<Vec3d> axes = fibonacci_axes(set, 48);
     ASSERT_EQ(axes.size(), 48U);
     for (const Vec3d& axis : axes) EXPECT_NEAR(axis.norm(), 1, 1e-15);
@@ -26,8 +27,8 @@ TEST(FibonacciAxes, AzimuthTurnsByTheGoldenAngle) {
   EXPECT_NEAR(std::remainder(std::atan2(axes[6].y(), axes[6].x()) - 7 * turn, 2 * kPi), 0, 1e-13);
 }
 
-// The centred sets integrate z and z^2 over their domain to second order in 1 / count; the printed set is off
-// by 1 / (2 count).
+// The centred sets integrate z and z^2 over their domain to second order in 1 / count; the printed
+// set is off by 1 / (2 count).
 TEST(FibonacciAxesLaw, MomentsOfTheDomain) {
   auto mean = [](FibonacciSet set, int power) {
     double sum = 0;

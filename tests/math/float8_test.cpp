@@ -12,7 +12,8 @@ namespace {
 
 /// Largest distance of function(x) from exact(x), over `count` points of [begin, end].
 template <class Function, class Exact>
-double largest_error(Function&& function, Exact&& exact, double begin, double end, bool relative = false) {
+double largest_error(Function&& function, Exact&& exact, double begin, double end,
+                     bool relative = false) {
   constexpr int kCount = 80000;
   double worst = 0;
   for (int first = 0; first < kCount; first += kFloat8Lanes) {
@@ -23,7 +24,8 @@ double largest_error(Function&& function, Exact&& exact, double begin, double en
     const Float8 y = function(x);
     for (int k = 0; k < kFloat8Lanes; ++k) {
       const double wanted = exact(static_cast<double>(x[k]));
-      worst = std::max(worst, std::abs(static_cast<double>(y[k]) - wanted) / (relative ? wanted : 1));
+      worst =
+          std::max(worst, std::abs(static_cast<double>(y[k]) - wanted) / (relative ? wanted : 1));
     }
   }
   return worst;

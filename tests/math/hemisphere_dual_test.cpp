@@ -58,9 +58,11 @@ double relative_error(const std::function<double(const Vec3d&)>& function,
   return std::sqrt(error / square);
 }
 
-// A projection: what it rebuilds, it rebuilds again from its own moments. (Floats, eigenvalues from 0.09 on.)
+// A projection: what it rebuilds, it rebuilds again from its own moments. (Floats, eigenvalues from
+// 0.09 on.)
 TEST(HemisphereDualLaw, RebuildingTwiceChangesNothing) {
-  const Moments first = moments_of([](const Vec3d& w) { return std::exp(3 * (w.x() - 1)) + w.y(); });
+  const Moments first =
+      moments_of([](const Vec3d& w) { return std::exp(3 * (w.x() - 1)) + w.y(); });
   const auto once = [&](const Vec3d& w) { return rebuilt(first, w); };
   const Moments second = moments_of(once);
   EXPECT_LT(relative_error(once, [&](const Vec3d& w) { return rebuilt(second, w); }), 1e-5);
@@ -80,12 +82,15 @@ TEST(HemisphereDualLaw, TheErrorIsOrthogonalToTheApproximation) {
   EXPECT_LT(std::abs(product / square), 1e-5);
 }
 
-// What it is for. Transfer of a fabric rises steeply from 0 at the horizon, where light begins to reach the crests, and has a
-// lobe to one side. The plain expansion, and twice its part odd in z (which continues the function oddly), are the
-// alternatives. (A function that falls to 0 like the cosine itself is odd, and the odd part alone better.)
+// What it is for. Transfer of a fabric rises steeply from 0 at the horizon, where light begins to
+// reach the crests, and has a lobe to one side. The plain expansion, and twice its part odd in z
+// (which continues the function oddly), are the alternatives. (A function that falls to 0 like the
+// cosine itself is odd, and the odd part alone better.)
 TEST(HemisphereDualLaw, BeatsThePlainAndTheOddExpansion) {
   for (const double lobe : {0.0, 2.0, 8.0}) {
-    const auto function = [&](const Vec3d& w) { return (1 - std::exp(-w.z() / 0.15)) * (0.2 + std::exp(lobe * (w.x() - 1))); };
+    const auto function = [&](const Vec3d& w) {
+      return (1 - std::exp(-w.z() / 0.15)) * (0.2 + std::exp(lobe * (w.x() - 1)));
+    };
     const Moments moments = moments_of(function);
     const auto expansion = [&](const Vec3d& w, bool odd) {
       Moments y;
@@ -99,8 +104,10 @@ TEST(HemisphereDualLaw, BeatsThePlainAndTheOddExpansion) {
       }
       return sum;
     };
-    const double own = relative_error(function, [&](const Vec3d& w) { return rebuilt(moments, w); });
-    const double plain = relative_error(function, [&](const Vec3d& w) { return expansion(w, false); });
+    const double own =
+        relative_error(function, [&](const Vec3d& w) { return rebuilt(moments, w); });
+    const double plain =
+        relative_error(function, [&](const Vec3d& w) { return expansion(w, false); });
     const double odd = relative_error(function, [&](const Vec3d& w) { return expansion(w, true); });
     std::printf("lobe %.0f: least squares %.4f, plain %.4f, odd %.4f\n", lobe, own, plain, odd);
     EXPECT_LT(own, 0.85 * plain);

@@ -22,7 +22,8 @@ TEST(NonnegativeLeastSquares, KnownSolutionInTwoUnknowns) {
 }
 
 TEST(NonnegativeLeastSquares, ZeroRightSideGivesZero) {
-  EXPECT_EQ(nonnegative_least_squares(Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero()).norm(), 0);
+  EXPECT_EQ(nonnegative_least_squares(Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero()).norm(),
+            0);
 }
 
 // y made from weights that are not negative is fitted without residual: the weights come back.

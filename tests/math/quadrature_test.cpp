@@ -36,12 +36,14 @@ TEST(QuadratureLaw, GaussHermiteGivesTheMomentsOfTheGaussian) {
 TEST(QuadratureLaw, CutRuleIsExactToDegreeFive) {
   for (const double cut : {-1.0, 0.0, 0.4, 1.3, 3.0, 5.0, 20.0}) {
     const ThreeNodeRule rule = cut_gauss_hermite3(cut);
-    const QuadratureRule fine = gauss_legendre_panels(40, -7.0, std::min(cut, 7.0), {-3.0, 0.0, 3.0});
+    const QuadratureRule fine =
+        gauss_legendre_panels(40, -7.0, std::min(cut, 7.0), {-3.0, 0.0, 3.0});
     for (int degree = 0; degree <= 5; ++degree) {
       const double exact =
           integrate(fine, [degree](double x) { return std::pow(x, degree) * std::exp(-x * x); });
       double value = 0.0;
-      for (std::size_t k = 0; k < 3; ++k) value += rule.weights[k] * std::pow(rule.nodes[k], degree);
+      for (std::size_t k = 0; k < 3; ++k)
+        value += rule.weights[k] * std::pow(rule.nodes[k], degree);
       EXPECT_NEAR(value, exact, 1e-12) << "cut " << cut << ", degree " << degree;
     }
     EXPECT_LT(rule.nodes[2], cut);

@@ -30,7 +30,8 @@ TEST(Random, NeighbouringAddressesShareNoDraw) {
       }
     }
   }
-  EXPECT_EQ(seen.size(), draws);  // 64,000 draws of 64 bits: a chance collision has probability 1e-10
+  // 64,000 draws of 64 bits: a chance collision has probability 1e-10
+  EXPECT_EQ(seen.size(), draws);
 }
 
 TEST(Random, UniformStaysBelowOne) {
@@ -47,7 +48,8 @@ TEST(RandomStatistical, PairsOfDrawsAreUniform) {
   constexpr int kSide = 32;
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<double> observed(kSide * kSide, 0.0);
-    const std::vector<double> expected(kSide * kSide, static_cast<double>(kCount) / (kSide * kSide));
+    const std::vector<double> expected(kSide * kSide,
+                                       static_cast<double>(kCount) / (kSide * kSide));
     for (int k = 0; k < kCount; ++k) {
       const auto i = static_cast<std::uint64_t>(k);
       RandomStream a(11, RandomStage::kTest, axis == 2 ? i : 0, axis == 1 ? i : 0);
@@ -56,12 +58,12 @@ TEST(RandomStatistical, PairsOfDrawsAreUniform) {
       const double u = a.uniform();
       if (axis == 0) b = a;
       const double v = b.uniform_double();
-      observed[static_cast<std::size_t>(static_cast<int>(u * kSide) * kSide + static_cast<int>(v * kSide))] +=
-          1.0;
+      observed[static_cast<std::size_t>(static_cast<int>(u * kSide) * kSide +
+                                        static_cast<int>(v * kSide))] += 1.0;
     }
     const ChiSquareResult result = chi_square(expected, observed);
-    std::printf("  pairs along axis %d: chi-square %.1f, %d degrees, p = %.3g\n", axis, result.statistic,
-                result.degrees, result.p_value);
+    std::printf("  pairs along axis %d: chi-square %.1f, %d degrees, p = %.3g\n", axis,
+                result.statistic, result.degrees, result.p_value);
     EXPECT_GT(result.p_value, sidak_significance(3));
   }
 }

@@ -41,7 +41,8 @@ TEST(SamplingStatistical, DiskIsUniform) {
   RandomStream random(3, RandomStage::kTest, 0, 0);
   constexpr int kSide = 16;
   std::vector<double> observed(kSide * kSide, 0.0);
-  const std::vector<double> expected(kSide * kSide, static_cast<double>(kSamples) / (kSide * kSide));
+  const std::vector<double> expected(kSide * kSide,
+                                     static_cast<double>(kSamples) / (kSide * kSide));
   for (int k = 0; k < kSamples; ++k) {
     // Squared radius and angle are uniform for a uniform point.
     const Vec2 p = sample_disk(random);
@@ -68,7 +69,8 @@ TEST(SamplingStatistical, SphericalGaussian) {
         "spherical Gaussian " + std::to_string(sharpness),
         [&] { return Vec3d(sample_spherical_gaussian(axis, sharpness, random).cast<double>()); },
         [&](const Vec3d& w) {
-          return sg_value({axis.cast<double>(), sharpness}, w) / sg_mass(static_cast<double>(sharpness));
+          return sg_value({axis.cast<double>(), sharpness}, w) /
+                 sg_mass(static_cast<double>(sharpness));
         },
         kSamples, 6, window));
   }
@@ -83,8 +85,8 @@ TEST(SamplingStatistical, SphericalGaussianMomentsUpToTheHighestSharpness) {
       const Vec3 w = sample_spherical_gaussian(axis, sharpness, random);
       drop.add(0.5 * static_cast<double>((w - axis).squaredNorm()));
     }
-    // Mean of 1 - cosine is 1 - A_1. At 1e8 rounding of float directions (6e-8 per component against 1e-4)
-    // adds below 1e-6.
+    // Mean of 1 - cosine is 1 - A_1. At 1e8 rounding of float directions (6e-8 per component
+    // against 1e-4) adds below 1e-6.
     const double lambda = sharpness;
     const double exact = lambda > 1e3 ? 1.0 / lambda : 1.0 - spherical_bessel_ratios(1, lambda)[1];
     EXPECT_TRUE(means_agree("1 - cosine, sharpness " + std::to_string(sharpness), drop.mean(),
@@ -100,7 +102,8 @@ TEST(SamplingAgreement, FloatDensityOfTheSphericalGaussian) {
       const Vec3 w = sample_spherical_gaussian(axis, sharpness, random);
       const double exact = sg_value({axis.cast<double>(), sharpness}, w.cast<double>()) /
                            sg_mass(static_cast<double>(sharpness));
-      EXPECT_NEAR(static_cast<double>(spherical_gaussian_pdf(axis, sharpness, w)) / exact, 1.0, 1e-4);
+      EXPECT_NEAR(static_cast<double>(spherical_gaussian_pdf(axis, sharpness, w)) / exact, 1.0,
+                  1e-4);
     }
   }
 }
@@ -142,24 +145,26 @@ TEST(SamplingStatistical, CutGaussian) {
     const double deviation = radians(c.deviation_deg);
     const double mass = 0.5 * erf_difference((-0.5 * kPi - c.mean) / (std::sqrt(2.0) * deviation),
                                              (0.5 * kPi - c.mean) / (std::sqrt(2.0) * deviation));
-    EXPECT_NEAR(
-        static_cast<double>(cut_gaussian_mass(static_cast<float>(c.mean), static_cast<float>(deviation))) /
-            mass,
-        1.0, 1e-5);
+    EXPECT_NEAR(static_cast<double>(
+                    cut_gaussian_mass(static_cast<float>(c.mean), static_cast<float>(deviation))) /
+                    mass,
+                1.0, 1e-5);
     const AngleWindow window{std::max(-0.5 * kPi, c.mean - 5.0 * deviation),
                              std::min(0.5 * kPi, c.mean + 5.0 * deviation)};
     EXPECT_TRUE(chi_square_accepts(
         "cut Gaussian " + std::to_string(c.deviation_deg) + " deg",
         [&] {
-          const double theta =
-              sample_cut_gaussian(static_cast<float>(c.mean), static_cast<float>(deviation), random);
+          const double theta = sample_cut_gaussian(static_cast<float>(c.mean),
+                                                   static_cast<float>(deviation), random);
           const double phi = 2.0 * kPi * random.uniform_double();
-          return Vec3d(std::sin(theta), std::cos(theta) * std::cos(phi), std::cos(theta) * std::sin(phi));
+          return Vec3d(std::sin(theta), std::cos(theta) * std::cos(phi),
+                       std::cos(theta) * std::sin(phi));
         },
         [&](const Vec3d& w) {
           const double cosine = std::hypot(w.y(), w.z());
           const double z = (std::atan2(w.x(), cosine) - c.mean) / deviation;
-          return std::exp(-0.5 * z * z) / (std::sqrt(2.0 * kPi) * deviation * mass) / (2.0 * kPi * cosine);
+          return std::exp(-0.5 * z * z) / (std::sqrt(2.0 * kPi) * deviation * mass) /
+                 (2.0 * kPi * cosine);
         },
         kSamples, 6, window));
   }

@@ -30,7 +30,8 @@ TEST(SgSumFitLaw, VoronoiWeightsKeepTheOpenSolidAngle) {
   for (FibonacciSet set : {FibonacciSet::kPrinted, FibonacciSet::kHemisphere}) {
     const SgSumFit fit(64, {set, 48, 128, SgWeights::kVoronoi});
     EXPECT_NEAR(fit.weights(upper_half(64)).sum(), 2 * kPi, 1e-12);
-    EXPECT_NEAR(fit.weights(whole(64)).sum(), 2 * kPi, 1e-12) << "below the horizon counts as closed";
+    EXPECT_NEAR(fit.weights(whole(64)).sum(), 2 * kPi, 1e-12)
+        << "below the horizon counts as closed";
   }
   const SgSumFit fit(64, {FibonacciSet::kSphere, 48, 128, SgWeights::kVoronoi});
   EXPECT_NEAR(fit.weights(whole(64)).sum(), 4 * kPi, 1e-12);
@@ -50,8 +51,10 @@ TEST(SgSumFit, VoronoiWeightOfOneCellGoesToItsNearestAxis) {
     EXPECT_DOUBLE_EQ(weights.maxCoeff(&largest), grid.solid_angle(row));
     EXPECT_DOUBLE_EQ(weights.sum(), grid.solid_angle(row));
     for (const Vec3d& axis : fit.axes()) {
-      EXPECT_LE((rotation * axis).dot(grid.centre(row, 30)),
-                (rotation * fit.axes()[static_cast<std::size_t>(largest)]).dot(grid.centre(row, 30)) + 1e-12);
+      EXPECT_LE(
+          (rotation * axis).dot(grid.centre(row, 30)),
+          (rotation * fit.axes()[static_cast<std::size_t>(largest)]).dot(grid.centre(row, 30)) +
+              1e-12);
     }
   }
 }
@@ -64,7 +67,8 @@ TEST(SgSumFitAgreement, NnlsResidualIsStationary) {
   const LatLongGrid grid(n);
   SphericalMap map(n);
   for (int row = 0; row < n / 2; ++row) {
-    for (int column = 0; column < n; ++column) map.set(row, column, column < 15 || (row < 6 && column > 30));
+    for (int column = 0; column < n; ++column)
+      map.set(row, column, column < 15 || (row < 6 && column > 30));
   }
   const SgSumFit fit(n, {FibonacciSet::kHemisphere, 48, sharpness, SgWeights::kNnls});
   const Eigen::VectorXd weights = fit.weights(map);
@@ -84,7 +88,8 @@ TEST(SgSumFitAgreement, NnlsResidualIsStationary) {
       if (!map.open(row / 3, column / 6)) continue;
       const double polar = (row + 0.5) * grid.row_step() / 3;
       const double azimuth = (column + 0.5) * grid.column_step() / 6;
-      parts.emplace_back(std::sin(polar) * std::cos(azimuth), std::sin(polar) * std::sin(azimuth), std::cos(polar));
+      parts.emplace_back(std::sin(polar) * std::cos(azimuth), std::sin(polar) * std::sin(azimuth),
+                         std::cos(polar));
       part_areas.push_back(std::sin(polar) * grid.row_step() / 3 * grid.column_step() / 6);
     }
   }
@@ -93,7 +98,8 @@ TEST(SgSumFitAgreement, NnlsResidualIsStationary) {
   for (std::size_t i = 0; i < centres.size(); ++i) {
     double blurred = 0;
     for (std::size_t j = 0; j < parts.size(); ++j) {
-      blurred += part_areas[j] * sg_value({parts[j], SgSumFit::kBlur}, centres[i]) / sg_mass(SgSumFit::kBlur);
+      blurred += part_areas[j] * sg_value({parts[j], SgSumFit::kBlur}, centres[i]) /
+                 sg_mass(SgSumFit::kBlur);
     }
     residual[i] = sg_sum_value(fit.axes(), weights, sharpness, centres[i]) - blurred;
     blurred_square += areas[i] * blurred * blurred;
@@ -144,9 +150,11 @@ TEST(SgSumFitAgreement, CoarseMapIsItsRefinement) {
       for (int c = 0; c < 16; ++c) fine_map.set(16 * row + r, 16 * column + c, true);
     }
   }
-  // Midpoint sums over parts of 0.025 rad of a Gaussian 0.09 rad wide: error (0.025 / 0.09)^2 / 24 = 0.3 %.
+  // Midpoint sums over parts of 0.025 rad of a Gaussian 0.09 rad wide: error (0.025 / 0.09)^2 / 24
+  // = 0.3 %.
   const Eigen::VectorXd weights = fine.weights(fine_map);
-  EXPECT_LT((coarse.weights(coarse_map) - weights).cwiseAbs().maxCoeff(), 0.01 * weights.maxCoeff());
+  EXPECT_LT((coarse.weights(coarse_map) - weights).cwiseAbs().maxCoeff(),
+            0.01 * weights.maxCoeff());
 }
 
 TEST(SgSum, IntegralIsTheValueBlurred) {
@@ -159,11 +167,12 @@ TEST(SgSum, IntegralIsTheValueBlurred) {
   for (int row = 0; row < n; ++row) {
     for (int column = 0; column < n; ++column) {
       const Vec3d w = grid.centre(row, column);
-      sum += grid.solid_angle(row) * sg_sum_value(axes, weights, 40, w) * sg_value({direction, 25}, w) / sg_mass(25.0);
+      sum += grid.solid_angle(row) * sg_sum_value(axes, weights, 40, w) *
+             sg_value({direction, 25}, w) / sg_mass(25.0);
     }
   }
-  // Midpoint sums over cells of 0.025 rad of Gaussians of width 0.16 rad: error about (0.025 / 0.16)^2 / 24 =
-  // 1e-3.
+  // Midpoint sums over cells of 0.025 rad of Gaussians of width 0.16 rad: error about (0.025 /
+  // 0.16)^2 / 24 = 1e-3.
   EXPECT_NEAR(sg_sum_integral(axes, weights, 40, direction, 25), sum, 1e-3 * sum);
 }
 

@@ -18,8 +18,8 @@ Mat3d random_rotation(RandomStream& random) {
       .toRotationMatrix();
 }
 
-// Generic, the identity, about z only, upside down, and tilted by so little that a and g are only defined
-// together.
+// Generic, the identity, about z only, upside down, and tilted by so little that a and g are only
+// defined together.
 std::vector<Mat3d> rotations() {
   RandomStream random(5, RandomStage::kTest, 0, 0);
   std::vector<Mat3d> list;
@@ -29,9 +29,9 @@ std::vector<Mat3d> rotations() {
   list.push_back(Eigen::AngleAxisd(kPi, Vec3d::UnitX()).toRotationMatrix());
   list.push_back(Eigen::AngleAxisd(kPi, Vec3d(1.0, 2.0, 0.0).normalized()).toRotationMatrix());
   for (const double tilt : {1e-4, 1e-8, 1e-12, 1e-15}) {
-    list.push_back(
-        (Eigen::AngleAxisd(1.1, Vec3d::UnitZ()) * Eigen::AngleAxisd(tilt, Vec3d(1.0, 1.0, 0.0).normalized()))
-            .toRotationMatrix());
+    list.push_back((Eigen::AngleAxisd(1.1, Vec3d::UnitZ()) *
+                    Eigen::AngleAxisd(tilt, Vec3d(1.0, 1.0, 0.0).normalized()))
+                       .toRotationMatrix());
   }
   return list;
 }
@@ -55,7 +55,8 @@ TEST(ShRotationLaw, HarmonicsOfTheTurnedDirection) {
 }
 
 TEST(ShRotationLaw, CoefficientsOfTheTurnedFunction) {
-  // rotate(project f) = project(rotate f): the series with turned coefficients at w is the old one at R^T w.
+  // rotate(project f) = project(rotate f): the series with turned coefficients at w is the old one
+  // at R^T w.
   RandomStream random(7, RandomStage::kTest, 0, 0);
   for (const Mat3d& rotation : rotations()) {
     std::vector<double> f(sh_count(5));
@@ -106,7 +107,8 @@ TEST(ShRotationAgreement, ThreeFloatColoursAgainstDouble) {
         one[static_cast<std::size_t>(j)] = in[static_cast<std::size_t>(3 * j + channel)];
       turn.rotate(one.data(), one.data());
       for (int j = 0; j < kCount; ++j) {
-        EXPECT_NEAR(out[static_cast<std::size_t>(3 * j + channel)], one[static_cast<std::size_t>(j)], 3e-6);
+        EXPECT_NEAR(out[static_cast<std::size_t>(3 * j + channel)],
+                    one[static_cast<std::size_t>(j)], 3e-6);
       }
     }
   }

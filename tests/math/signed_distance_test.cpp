@@ -30,8 +30,9 @@ SphericalMap caps(int resolution, int count, double radius, std::uint64_t seed) 
   }
   const LatLongGrid grid(resolution);
   return map_of(resolution, [&](int row, int column) {
-    return std::any_of(axes.begin(), axes.end(),
-                       [&](const Vec3d& axis) { return axis.dot(grid.centre(row, column)) > std::cos(radius); });
+    return std::any_of(axes.begin(), axes.end(), [&](const Vec3d& axis) {
+      return axis.dot(grid.centre(row, column)) > std::cos(radius);
+    });
   });
 }
 
@@ -45,8 +46,8 @@ Vec3d random_direction(std::uint64_t i) {
   return sample_sphere(random).cast<double>().normalized();
 }
 
-// Largest difference between the transform and the exact distance over every `stride`th cell, as a share of
-// the bound.
+// Largest difference between the transform and the exact distance over every `stride`th cell, as a
+// share of the bound.
 double transform_error_in_bounds(const SphericalMap& map, int stride) {
   const int n = map.resolution();
   std::vector<float> distance(map.grid().cell_count());
@@ -56,9 +57,11 @@ double transform_error_in_bounds(const SphericalMap& map, int stride) {
   double worst = 0;
   for (int cell = 0; cell < n * n; cell += stride) {
     const double truth = exact(map.grid().centre(cell / n, cell % n));
-    const double bound =
-        std::abs(truth) <= 3 ? SignedDistanceTransform::kMaxError : SignedDistanceTransform::kMaxErrorNearAntipode;
-    worst = std::max(worst, std::abs(truth - static_cast<double>(distance[static_cast<std::size_t>(cell)])) / bound);
+    const double bound = std::abs(truth) <= 3 ? SignedDistanceTransform::kMaxError
+                                              : SignedDistanceTransform::kMaxErrorNearAntipode;
+    worst = std::max(
+        worst,
+        std::abs(truth - static_cast<double>(distance[static_cast<std::size_t>(cell)])) / bound);
   }
   return worst;
 }
@@ -75,7 +78,8 @@ TEST(ExactSignedDistance, HalfSpaceAboveTheEquator) {
   }
 }
 
-// The edge is a great circle through both poles: every distance ends on a meridian side or at a pole.
+// The edge is a great circle through both poles: every distance ends on a meridian side or at a
+// pole.
 TEST(ExactSignedDistance, HalfSpaceBesideTheMeridian) {
   for (int n : {8, 128}) {
     const ExactSignedDistance exact(map_of(n, [&](int, int column) { return column < n / 2; }));
@@ -107,12 +111,13 @@ TEST(ExactSignedDistance, NoEdgeIsPlusOrMinusPi) {
   }
 }
 
-// Against points spread over every opposite cell: no point may be nearer, and one must be within half a point
-// spacing.
+// Against points spread over every opposite cell: no point may be nearer, and one must be within
+// half a point spacing.
 TEST(ExactSignedDistanceAgreement, NearestPointOfOppositeCells) {
   const int n = 12;
   const int points = 40;
-  for (const SphericalMap& map : {noise(n, 0.05, 1), noise(n, 0.5, 2), noise(n, 0.95, 3), caps(n, 3, 0.7, 4)}) {
+  for (const SphericalMap& map :
+       {noise(n, 0.05, 1), noise(n, 0.5, 2), noise(n, 0.95, 3), caps(n, 3, 0.7, 4)}) {
     const ExactSignedDistance exact(map);
     for (std::uint64_t i = 0; i < 30; ++i) {
       const Vec3d w = random_direction(i);
@@ -126,7 +131,8 @@ TEST(ExactSignedDistanceAgreement, NearestPointOfOppositeCells) {
             for (int b = 0; b <= points; ++b) {
               const double polar = (row + static_cast<double>(a) / points) * kPi / n;
               const double azimuth = (column + static_cast<double>(b) / points) * 2 * kPi / n;
-              const Vec3d p(std::sin(polar) * std::cos(azimuth), std::sin(polar) * std::sin(azimuth), std::cos(polar));
+              const Vec3d p(std::sin(polar) * std::cos(azimuth),
+                            std::sin(polar) * std::sin(azimuth), std::cos(polar));
               nearest = std::min(nearest, (w - p).norm());
             }
           }
@@ -145,7 +151,9 @@ TEST(ExactSignedDistanceAgreement, NearestPointOfOppositeCells) {
 TEST(SignedDistanceTransformAgreement, ExactAtEveryCellOfSmallMaps) {
   for (int n : {1, 2, 3, 4, 5, 6, 7, 16, 33}) {
     for (std::uint64_t seed = 1; seed <= 20; ++seed) {
-      EXPECT_LE(transform_error_in_bounds(noise(n, 0.05 * static_cast<double>(seed - 1) + 0.02, seed), 1), 1)
+      EXPECT_LE(
+          transform_error_in_bounds(noise(n, 0.05 * static_cast<double>(seed - 1) + 0.02, seed), 1),
+          1)
           << "n " << n << " seed " << seed;
     }
   }
@@ -153,10 +161,12 @@ TEST(SignedDistanceTransformAgreement, ExactAtEveryCellOfSmallMaps) {
 
 TEST(SignedDistanceTransformAgreement, ExactOnMapsOfFullSize) {
   const int n = 128;
-  std::vector<SphericalMap> maps = {caps(n, 1, 0.3, 1), caps(n, 5, 0.5, 2), caps(n, 40, 0.15, 3), noise(n, 0.001, 4)};
+  std::vector<SphericalMap> maps = {caps(n, 1, 0.3, 1), caps(n, 5, 0.5, 2), caps(n, 40, 0.15, 3),
+                                    noise(n, 0.001, 4)};
   // One cell at a pole, one across the wrap, a slit along a meridian through both poles.
   maps.push_back(map_of(n, [](int row, int column) { return row == 0 && column == 17; }));
-  maps.push_back(map_of(n, [](int row, int column) { return row == 127 || (row == 60 && column == 0); }));
+  maps.push_back(
+      map_of(n, [](int row, int column) { return row == 127 || (row == 60 && column == 0); }));
   maps.push_back(map_of(n, [](int row, int column) { return row == 60 && column == 127; }));
   maps.push_back(map_of(n, [](int, int column) { return column == 5 || column == 69; }));
   for (std::size_t i = 0; i < maps.size(); ++i) {

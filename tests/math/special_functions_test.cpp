@@ -46,7 +46,8 @@ TEST(SpecialFunctionsAgreement, ScaledBesselI0) {
   for (double x = 1e-3; x < 1e9; x *= 1.37) {
     EXPECT_NEAR(scaled_bessel_i0(x) / scaled_bessel_by_quadrature(0, x), 1.0, 1e-12) << x;
     const auto single = static_cast<float>(x);
-    EXPECT_NEAR(static_cast<double>(scaled_bessel_i0(single)) / scaled_bessel_i0(static_cast<double>(single)),
+    EXPECT_NEAR(static_cast<double>(scaled_bessel_i0(single)) /
+                    scaled_bessel_i0(static_cast<double>(single)),
                 1.0, 1e-6)
         << x;
   }
@@ -81,14 +82,15 @@ TEST(SpecialFunctionsStability, ErfDifferenceKeepsItsRelativeAccuracyInTheTails)
   for (const double middle : {-12.0, -5.0, -0.3, 0.0, 0.3, 5.0, 12.0}) {
     constexpr double kWidth = 1e-5;
     const double exact = 2.0 / std::sqrt(kPi) * std::exp(-middle * middle) * kWidth;
-    EXPECT_NEAR(erf_difference(middle - 0.5 * kWidth, middle + 0.5 * kWidth) / exact, 1.0, 1e-8) << middle;
+    EXPECT_NEAR(erf_difference(middle - 0.5 * kWidth, middle + 0.5 * kWidth) / exact, 1.0, 1e-8)
+        << middle;
   }
   EXPECT_EQ(erf_difference(-30.0, 30.0), 2.0);
 }
 
 TEST(SpecialFunctionsLaw, GaussianCos2MeanInTheOpenIntervalIsTheFullGaussianMean) {
-  // Uncut, the mean of cos^2 is (1 + cos(2 mu) exp(-2 beta^2)) / 2; ten deviations from the ends the cut does
-  // not show.
+  // Uncut, the mean of cos^2 is (1 + cos(2 mu) exp(-2 beta^2)) / 2; ten deviations from the ends
+  // the cut does not show.
   for (const double beta_deg : {0.01, 0.1, 1.0, 5.0}) {
     const double beta = radians(beta_deg);
     for (const double mu : {0.0, 0.3, -0.6}) {
@@ -102,7 +104,8 @@ TEST(SpecialFunctionsLaw, GaussianCos2MeanAtTheEndIsHalfTheVariance) {
   for (const double beta_deg : {0.01, 0.1, 0.5}) {
     const double beta = radians(beta_deg);
     EXPECT_NEAR(gaussian_cos2_mean(0.5 * kPi, beta) / (0.5 * beta * beta), 1.0, 2.0 * beta * beta);
-    EXPECT_NEAR(gaussian_cos2_mean(-0.5 * kPi, beta) / gaussian_cos2_mean(0.5 * kPi, beta), 1.0, 1e-14);
+    EXPECT_NEAR(gaussian_cos2_mean(-0.5 * kPi, beta) / gaussian_cos2_mean(0.5 * kPi, beta), 1.0,
+                1e-14);
   }
 }
 
@@ -112,9 +115,11 @@ TEST(SpecialFunctionsAgreement, GaussianCos2MeanAgainstPanels) {
     for (double mu = 0.0; mu <= 0.5 * kPi; mu += kPi / 16.0) {
       std::vector<double> breaks;
       append_geometric_breaks(mu, beta, 4.0, breaks);
-      const double exact = integrate(gauss_legendre_panels(20, -0.5 * kPi, 0.5 * kPi, breaks), [&](double t) {
-        return std::exp(-0.5 * std::pow((t - mu) / beta, 2)) * std::pow(std::sin(0.5 * kPi - std::abs(t)), 2);
-      });
+      const double exact =
+          integrate(gauss_legendre_panels(20, -0.5 * kPi, 0.5 * kPi, breaks), [&](double t) {
+            return std::exp(-0.5 * std::pow((t - mu) / beta, 2)) *
+                   std::pow(std::sin(0.5 * kPi - std::abs(t)), 2);
+          });
       EXPECT_NEAR(gaussian_cos2_mean(mu, beta) * std::sqrt(2.0 * kPi) * beta / exact, 1.0, 1e-12)
           << beta_deg << " deg at " << mu;
     }

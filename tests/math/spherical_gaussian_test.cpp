@@ -12,7 +12,8 @@
 namespace heddle {
 namespace {
 
-// Integral over the sphere of G about +z times f(cosine), by panels in 1 - cosine that resolve the peak.
+// Integral over the sphere of G about +z times f(cosine), by panels in 1 - cosine that resolve the
+// peak.
 template <typename Function>
 double integrate_about_z(double sharpness, Function&& f) {
   std::vector<double> breaks;
@@ -37,13 +38,14 @@ TEST(SphericalGaussianAgreement, ZonalCoefficientsAgainstQuadrature) {
     const std::vector<double> zonal = sg_zonal(10, sharpness);
     for (int l = 0; l <= 10; ++l) {
       const double exact =
-          integrate_about_z(sharpness,
-                            [l](double cosine) {
-                              double y[sh_count(10)];
-                              evaluate_sh(
-                                  10, Vec3d(std::sqrt(std::max(0.0, 1.0 - cosine * cosine)), 0.0, cosine), y);
-                              return y[l * (l + 1)];
-                            }) /
+          integrate_about_z(
+              sharpness,
+              [l](double cosine) {
+                double y[sh_count(10)];
+                evaluate_sh(10, Vec3d(std::sqrt(std::max(0.0, 1.0 - cosine * cosine)), 0.0, cosine),
+                            y);
+                return y[l * (l + 1)];
+              }) /
           sg_mass(sharpness);
       EXPECT_NEAR(zonal[static_cast<std::size_t>(l)], exact, 1e-11)
           << "l " << l << ", sharpness " << sharpness;
@@ -62,10 +64,10 @@ TEST(SphericalGaussianLaw, ProductIsTheProductEverywhere) {
       for (int k = 0; k < 20; ++k) {
         const Vec3d w = sample_sphere(random).cast<double>().normalized();
         // Compared as exponents: the values themselves underflow.
-        const double separate =
-            -0.5 * (sharpness_a * (w - a.axis).squaredNorm() + sharpness_b * (w - b.axis).squaredNorm());
-        const double together =
-            product.log_scale - 0.5 * product.gaussian.sharpness * (w - product.gaussian.axis).squaredNorm();
+        const double separate = -0.5 * (sharpness_a * (w - a.axis).squaredNorm() +
+                                        sharpness_b * (w - b.axis).squaredNorm());
+        const double together = product.log_scale - 0.5 * product.gaussian.sharpness *
+                                                        (w - product.gaussian.axis).squaredNorm();
         EXPECT_NEAR(together, separate, 1e-13 * (1.0 + sharpness_a + sharpness_b));
       }
     }

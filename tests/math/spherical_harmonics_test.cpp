@@ -66,7 +66,8 @@ TEST(SphericalHarmonicsAgreement, FloatAgainstDoubleAtEveryOrder) {
   RandomStream random(2, RandomStage::kTest, 0, 0);
   for (int order = 0; order <= kMaxShOrder; ++order) {
     for (int k = 0; k < 50; ++k) {
-      const Vec3 w = k == 0 ? Vec3::UnitZ() : (k == 1 ? Vec3(-Vec3::UnitZ()) : sample_sphere(random));
+      const Vec3 w =
+          k == 0 ? Vec3::UnitZ() : (k == 1 ? Vec3(-Vec3::UnitZ()) : sample_sphere(random));
       std::vector<float> single(static_cast<std::size_t>(sh_count(order)));
       std::vector<double> twice(single.size());
       evaluate_sh(order, w, single.data());

@@ -37,7 +37,8 @@ class ArtifactRecordTest : public testing::Test {
   std::string problem() const { return check_artifact(artifact_, record_).problem; }
   std::set<std::string> names() const {
     std::set<std::string> names;
-    for (const auto& entry : fs::directory_iterator(artifact_.parent_path())) names.insert(entry.path().filename());
+    for (const auto& entry : fs::directory_iterator(artifact_.parent_path()))
+      names.insert(entry.path().filename());
     return names;
   }
   static void overwrite(const fs::path& file, const std::string& text) {
@@ -70,7 +71,8 @@ TEST_F(ArtifactRecordTest, EveryBitOfArtifactAndRecordCounts) {
       flipped[bit / 8] = static_cast<char>(flipped[bit / 8] ^ (1 << bit % 8));
       overwrite(file, flipped);
       // White space between the entries of the record says nothing.
-      const bool is_space = file == record_ && std::isspace(flipped[bit / 8]) && std::isspace(bytes[bit / 8]);
+      const bool is_space =
+          file == record_ && std::isspace(flipped[bit / 8]) && std::isspace(bytes[bit / 8]);
       if (is_space) continue;
       ASSERT_EQ(state(), ArtifactState::kBroken) << file << ", bit " << bit << "\n" << flipped;
       ASSERT_NE(problem().find(file.filename().string()), std::string::npos) << problem();
@@ -98,7 +100,9 @@ TEST_F(ArtifactRecordTest, EveryFileOfAFolderCounts) {
 
 TEST_F(ArtifactRecordTest, BrokenArtifactsAreReplacedAndSoundOnesStay) {
   for (const bool as_folder : {false, true}) {
-    const auto publish = [&](const std::string& text) { return as_folder ? publish_folder(text) : publish_file(text); };
+    const auto publish = [&](const std::string& text) {
+      return as_folder ? publish_folder(text) : publish_file(text);
+    };
     const fs::path file = as_folder ? artifact_ / "a" : artifact_;
     fs::remove_all(artifact_);
     publish("first");
@@ -124,7 +128,9 @@ TEST_F(ArtifactRecordTest, BrokenArtifactsAreReplacedAndSoundOnesStay) {
 }
 
 TEST_F(ArtifactRecordTest, WhoBuildsNothingFindsWhatAnotherProcessPublished) {
-  const auto nothing = [&] { return publish_artifact(artifact_, record_, [](const fs::path&) { return BuildCost{}; }); };
+  const auto nothing = [&] {
+    return publish_artifact(artifact_, record_, [](const fs::path&) { return BuildCost{}; });
+  };
   EXPECT_THROW(nothing(), FileError);
   publish_file("text");
   EXPECT_FALSE(nothing());

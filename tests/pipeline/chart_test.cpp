@@ -1,5 +1,6 @@
-// `heddle chart`: the law of its fronts, and the built program's charts of a tiny scene. The page is opened in Chromium, which
-// `pipeline/install_packages.sh --tests` installs; without it that test is skipped (and counted as such), but fails in CI.
+// `heddle chart`: the law of its fronts, and the built program's charts of a tiny scene. The page
+// is opened in Chromium, which `pipeline/install_packages.sh --tests` installs; without it that
+// test is skipped (and counted as such), but fails in CI.
 
 #include "pipeline/chart/chart.h"
 
@@ -31,7 +32,8 @@ std::vector<CostAndError> random_points(unsigned seed) {
   std::mt19937 random(seed);
   std::uniform_int_distribution<int> grid(1, 12);  // coarse, so that ties come up
   std::vector<CostAndError> points(40);
-  for (CostAndError& point : points) point = {static_cast<double>(grid(random)), static_cast<double>(grid(random))};
+  for (CostAndError& point : points)
+    point = {static_cast<double>(grid(random)), static_cast<double>(grid(random))};
   return points;
 }
 
@@ -44,8 +46,9 @@ TEST(ChartLaw, FrontIsWhatNothingDominates) {
     const std::vector<CostAndError> points = random_points(seed);
     const std::vector<bool> front = pareto_front(points);
     for (std::size_t k = 0; k < points.size(); ++k) {
-      const bool dominated = std::any_of(points.begin(), points.end(),
-                                         [&](const CostAndError& other) { return dominates(other, points[k]); });
+      const bool dominated =
+          std::any_of(points.begin(), points.end(),
+                      [&](const CostAndError& other) { return dominates(other, points[k]); });
       ASSERT_EQ(front[k], !dominated) << "seed " << seed << ", point " << k;
     }
   }
@@ -86,13 +89,16 @@ TEST(Chart, WorkTimeCountsCoresAndWalls) {
 // A variant reads as if the fabric said so, and so has the keys of a fabric that does.
 TEST(Chart, VariantsOfAFabricAreFabrics) {
   const TemporaryFolder folder;
-  const auto document = [&](const std::string& from, const std::string& to, const FabricVariant& variant) {
-    std::ofstream(folder.path() / "fabric.toml") << std::regex_replace(std::string(kSmallFabric), std::regex(from), to);
+  const auto document = [&](const std::string& from, const std::string& to,
+                            const FabricVariant& variant) {
+    std::ofstream(folder.path() / "fabric.toml")
+        << std::regex_replace(std::string(kSmallFabric), std::regex(from), to);
     return read_fabric_document(folder.path() / "fabric.toml", {}, variant);
   };
   const FabricDocument usual = document("", "", {});
   const FabricDocument varied = document("", "", {.cell_size = 2, .voxel_rate = 2});
-  const FabricDocument cells = document("cell_mean_free_paths = 2.5", "cell_mean_free_paths = 5.0", {});
+  const FabricDocument cells =
+      document("cell_mean_free_paths = 2.5", "cell_mean_free_paths = 5.0", {});
   const FabricDocument voxels = document("\\[volume\\]", "[volume]\nvoxels_per_radius = 3.0", {});
   EXPECT_NE(varied.transfer_text, usual.transfer_text);
   EXPECT_EQ(varied.transfer_text, cells.transfer_text);
@@ -158,11 +164,13 @@ TEST(Chart, SurfacesThatHaveAChoiceAreShadedBothWays) {
   EXPECT_TRUE(labels_of(chart_runs(scene, {}, {}), "exact, surfaces interactive").empty());
   scene.cloths[0].surface->interactive.emplace();
   for (const char* name : {"exact, surfaces sampled", "exact, surfaces interactive"}) {
-    EXPECT_EQ(labels_of(chart_runs(scene, {}, {.quick = true}), name), (std::vector<std::string>{"1 spp", "4 spp"}));
+    EXPECT_EQ(labels_of(chart_runs(scene, {}, {.quick = true}), name),
+              (std::vector<std::string>{"1 spp", "4 spp"}));
   }
   for (const ChartRun& run : chart_runs(scene, {}, {})) {
     EXPECT_EQ(run.settings.contains("surface_method"), run.variant.surface_method.has_value());
-    EXPECT_EQ(run.method == "exact, surfaces interactive", run.variant.surface_method == SurfaceMethod::kInteractive);
+    EXPECT_EQ(run.method == "exact, surfaces interactive",
+              run.variant.surface_method == SurfaceMethod::kInteractive);
   }
 }
 
@@ -194,7 +202,8 @@ fabric = "fabric.toml"
 method = "exact"
 )";
 
-/// A chart of a tiny scene. ctest runs each test in a process of its own, so each makes its chart: a few seconds.
+/// A chart of a tiny scene. ctest runs each test in a process of its own, so each makes its chart:
+/// a few seconds.
 class ChartEndToEnd : public testing::Test {
  protected:
   static void SetUpTestSuite() {
@@ -208,12 +217,14 @@ class ChartEndToEnd : public testing::Test {
   void SetUp() override { ASSERT_EQ(first_, 0) << text_of(folder_->path() / "stderr.txt"); }
 
   static ProgramResult run(std::vector<std::string> options, const std::string& name = "chart") {
-    options.insert(options.begin(), {"chart", folder_->path() / "scene.toml", "-o", folder_->path() / name, "--cache",
-                                     folder_->path() / "cache"});
+    options.insert(options.begin(), {"chart", folder_->path() / "scene.toml", "-o",
+                                     folder_->path() / name, "--cache", folder_->path() / "cache"});
     return Program(folder_->path(), options).wait();
   }
   static fs::path path(const std::string& name) { return folder_->path() / name; }
-  static Json chart(const std::string& name = "chart") { return Json::parse(text_of(path(name) / "chart.json")); }
+  static Json chart(const std::string& name = "chart") {
+    return Json::parse(text_of(path(name) / "chart.json"));
+  }
 
   static int command_status(const std::string& command) {
     const int status = std::system(command.c_str());
@@ -258,16 +269,17 @@ TEST_F(ChartEndToEnd, RowsAreCompleteAndSorted) {
     if (methods.empty() || methods.back() != method) methods.push_back(method);
     samples[method].push_back(row.at("settings").at("spp").get<int>());
   }
-  EXPECT_EQ(methods, (std::vector<std::string>{"path", "path, local", "exact", "volume", "exact, form of visibility",
-                                               "volume, resolution"}));
+  EXPECT_EQ(methods, (std::vector<std::string>{"path", "path, local", "exact", "volume",
+                                               "exact, form of visibility", "volume, resolution"}));
   for (const char* method : {"path", "path, local", "exact", "volume"}) {
     EXPECT_EQ(samples.at(method).size(), 2U);
     EXPECT_TRUE(std::is_sorted(samples.at(method).begin(), samples.at(method).end()));
   }
-  EXPECT_EQ(static_cast<std::size_t>(std::count(csv.begin(), csv.end(), '\n')), json.at("rows").size() + 1);
+  EXPECT_EQ(static_cast<std::size_t>(std::count(csv.begin(), csv.end(), '\n')),
+            json.at("rows").size() + 1);
   const std::string names = csv.substr(0, csv.find('\n'));
-  for (const char* name :
-       {"method", "settings", "key", "seed", "program_version", "full_relative_rmse", "local_flip"}) {
+  for (const char* name : {"method", "settings", "key", "seed", "program_version",
+                           "full_relative_rmse", "local_flip"}) {
     EXPECT_NE(names.find(name), std::string::npos) << name;
   }
   EXPECT_NE(csv.find("\"path, local\",2 spp,spp=2,done"), std::string::npos);
@@ -280,8 +292,10 @@ TEST_F(ChartEndToEnd, RowsFollowTheirSettings) {
   std::map<std::string, std::string> keys;
   std::map<std::string, double> error;
   for (const Json& row : json.at("rows")) {
-    const std::string name = row.at("method").get<std::string>() + " " + row.at("label").get<std::string>();
-    for (const Json& stage : row.at("stages")) stages[name].insert(stage.at("stage").get<std::string>());
+    const std::string name =
+        row.at("method").get<std::string>() + " " + row.at("label").get<std::string>();
+    for (const Json& stage : row.at("stages"))
+      stages[name].insert(stage.at("stage").get<std::string>());
     keys[name] = row.at("key");
     error[name] = row.at("error").at("full").at("relative_rmse");
   }
@@ -289,8 +303,10 @@ TEST_F(ChartEndToEnd, RowsFollowTheirSettings) {
   using Names = std::set<std::string>;
   EXPECT_EQ(stages.at("path 2 spp"), Names{"synth"});
   EXPECT_EQ(stages.at("exact 1 spp"), (Names{"synth", "maps", "ssdf", "sg", "transfer"}));
-  EXPECT_EQ(stages.at("volume 1 spp"), (Names{"synth", "maps", "ssdf", "sg", "transfer", "voxelize"}));
-  EXPECT_EQ(stages.at("exact, form of visibility signed distance"), (Names{"synth", "maps", "ssdf", "transfer"}));
+  EXPECT_EQ(stages.at("volume 1 spp"),
+            (Names{"synth", "maps", "ssdf", "sg", "transfer", "voxelize"}));
+  EXPECT_EQ(stages.at("exact, form of visibility signed distance"),
+            (Names{"synth", "maps", "ssdf", "transfer"}));
 
   // Settings that change pictures have keys of their own; those that do not share them.
   EXPECT_EQ(keys.at("exact, form of visibility blend"), keys.at("exact 4 spp"));
@@ -298,8 +314,9 @@ TEST_F(ChartEndToEnd, RowsFollowTheirSettings) {
   for (const auto& [name, key] : keys) distinct.insert(key);
   EXPECT_EQ(distinct.size(), keys.size() - 1);
 
-  // The path tracer has no bias: its error is its noise, which falls with the root of its samples (2 to 8: by half). Single
-  // values spread widely where there are so few; a factor of 1.5 is left on both sides.
+  // The path tracer has no bias: its error is its noise, which falls with the root of its samples
+  // (2 to 8: by half). Single values spread widely where there are so few; a factor of 1.5 is left
+  // on both sides.
   EXPECT_GT(error.at("path 8 spp") / error.at("path 2 spp"), 0.5 / 1.5);
   EXPECT_LT(error.at("path 8 spp") / error.at("path 2 spp"), 0.5 * 1.5);
 }
@@ -323,7 +340,8 @@ TEST_F(ChartEndToEnd, FollowsItsSchema) {
 std::map<std::string, fs::file_time_type> times_of(const fs::path& folder) {
   std::map<std::string, fs::file_time_type> times;
   for (const auto& entry : fs::directory_iterator(folder)) {
-    if (entry.path().extension() == ".exr") times[entry.path().filename()] = entry.last_write_time();
+    if (entry.path().extension() == ".exr")
+      times[entry.path().filename()] = entry.last_write_time();
   }
   return times;
 }
@@ -332,7 +350,8 @@ TEST_F(ChartEndToEnd, ResumeDoesNothingTwice) {
   fs::copy(path("chart"), path("resumed"), fs::copy_options::recursive);
   const auto before = times_of(path("resumed") / "runs");
   const Json first = chart();
-  const fs::path taken = path("resumed") / "runs" / (first.at("rows").at(2).at("key").get<std::string>() + ".exr");
+  const fs::path taken =
+      path("resumed") / "runs" / (first.at("rows").at(2).at("key").get<std::string>() + ".exr");
   fs::remove(taken);
   const ProgramResult result = run({"--quick", "--reference-spp", "64", "--resume"}, "resumed");
   ASSERT_EQ(result.status, 0) << result.error;
@@ -347,7 +366,8 @@ TEST_F(ChartEndToEnd, ResumeDoesNothingTwice) {
     const Json& b = second.at("rows").at(k);
     EXPECT_EQ(a.at("render_seconds") == b.at("render_seconds"), k != 2);
     EXPECT_EQ(a.at("key"), b.at("key"));
-    EXPECT_EQ(a.at("error").at("full").at("relative_rmse"), b.at("error").at("full").at("relative_rmse"));
+    EXPECT_EQ(a.at("error").at("full").at("relative_rmse"),
+              b.at("error").at("full").at("relative_rmse"));
     EXPECT_EQ(a.at("precompute_seconds"), b.at("precompute_seconds"));
   }
 }
@@ -369,7 +389,9 @@ TEST_F(ChartEndToEnd, AFailingRunIsARow) {
   for (const Json& row : json.at("rows")) {
     const bool needs_volume = row.at("method").get<std::string>().starts_with("volume");
     EXPECT_EQ(row.at("status"), needs_volume ? "failed" : "done") << row;
-    EXPECT_EQ(row.at("message").get<std::string>().find("voxelize") != std::string::npos, needs_volume) << row;
+    EXPECT_EQ(row.at("message").get<std::string>().find("voxelize") != std::string::npos,
+              needs_volume)
+        << row;
     EXPECT_EQ(row.at("error").at("full").is_null(), needs_volume);
   }
   EXPECT_EQ(json.at("rows").size(), chart().at("rows").size());
@@ -385,7 +407,8 @@ TEST_F(ChartEndToEnd, AFailingRunIsARow) {
 TEST_F(ChartEndToEnd, ScriptOfThePageRunsInChromium) {
   // It stands alone: but for the name of SVG there is no address in it.
   const std::string html = text_of(path("chart") / "index.html");
-  EXPECT_EQ(std::regex_replace(html, std::regex("http://www.w3.org/2000/svg"), "").find("http"), std::string::npos);
+  EXPECT_EQ(std::regex_replace(html, std::regex("http://www.w3.org/2000/svg"), "").find("http"),
+            std::string::npos);
   EXPECT_NE(html.find("tiny &lt;swatch&gt;, &quot;quoted&quot;"), std::string::npos);
   EXPECT_EQ(html.find("tiny <swatch>"), std::string::npos);
 
@@ -396,20 +419,22 @@ TEST_F(ChartEndToEnd, ScriptOfThePageRunsInChromium) {
     GTEST_SKIP() << reason;
   }
   const std::string command =
-      "timeout 60 chromium --headless --no-sandbox --disable-gpu --user-data-dir=" + path("profile").string() +
-      " --dump-dom file://" + (path("chart") / "index.html").string() + " > " + path("dom.html").string() +
-      " 2>/dev/null";
+      "timeout 60 chromium --headless --no-sandbox --disable-gpu --user-data-dir=" +
+      path("profile").string() + " --dump-dom file://" + (path("chart") / "index.html").string() +
+      " > " + path("dom.html").string() + " 2>/dev/null";
   ASSERT_EQ(command_status(command), 0);
   const std::string dom = text_of(path("dom.html"));
   const auto count_of = [&dom](const std::string& pattern) {
     const std::regex expression(pattern);
-    return std::distance(std::sregex_iterator(dom.begin(), dom.end(), expression), std::sregex_iterator());
+    return std::distance(std::sregex_iterator(dom.begin(), dom.end(), expression),
+                         std::sregex_iterator());
   };
   // Two references, two panels each.
   const auto rows = static_cast<std::ptrdiff_t>(chart().at("rows").size());
   EXPECT_EQ(count_of("<body data-points=\"" + std::to_string(4 * rows) + "\">"), 1);
   EXPECT_EQ(count_of("<tr data-row="), rows);
-  EXPECT_EQ(count_of("<img id=\"(picture|reference|difference)\"[^>]* src=\"data:image/png;base64,"), 3);
+  EXPECT_EQ(
+      count_of("<img id=\"(picture|reference|difference)\"[^>]* src=\"data:image/png;base64,"), 3);
 }
 
 }  // namespace

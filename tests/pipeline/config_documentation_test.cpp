@@ -1,4 +1,5 @@
-// configs/README.md documents every key that the parsers ask for, with its type, range and default, and no other.
+// configs/README.md documents every key that the parsers ask for, with its type, range and default,
+// and no other.
 
 #include <gtest/gtest.h>
 
@@ -31,7 +32,8 @@ using Keys = std::map<std::string, std::string>;
 /// The rows of one section of the README ("## Fabrics").
 Keys documented(const std::string& section) {
   std::ifstream stream(kConfigs / "README.md");
-  const std::regex row(R"(\| `([^`]+)` \| ([^|]+) \| ([^|]*(?:\\\|[^|]*)*) \| ([^|]+) \| ([^|]+)\|)");
+  const std::regex row(
+      R"(\| `([^`]+)` \| ([^|]+) \| ([^|]*(?:\\\|[^|]*)*) \| ([^|]+) \| ([^|]+)\|)");
   Keys keys;
   bool inside = false;
   for (std::string line; std::getline(stream, line);) {
@@ -93,12 +95,14 @@ TEST(ConfigDocumentation, NamesEveryKeyOfASurfaceFabric) {
     std::string more;  // what no preset holds
   };
   const std::string yarn =
-      "diffuse = [0, 0, 0]\nspecular = [0, 0, 0]\nsemimajor = 1\neccentricity = 0\nangle_deg = 0\nk = [1, 1]\n";
+      "diffuse = [0, 0, 0]\nspecular = [0, 0, 0]\nsemimajor = 1\neccentricity = 0\nangle_deg = "
+      "0\nk = [1, 1]\n";
   const Model models[] = {
       {"irawan-2012", "Woven yarns", ""},
       {"microcylinder", "Microcylinder", ""},
       {"woven-cotton", "Woven cotton",
-       "model = \"woven-cotton\"\nunit_mm = 1\n[weave]\nmatrix = \"10 01\"\nend_widths = [1]\npick_widths = [1]\n[warp]\n" +
+       "model = \"woven-cotton\"\nunit_mm = 1\n[weave]\nmatrix = \"10 01\"\nend_widths = "
+       "[1]\npick_widths = [1]\n[warp]\n" +
            yarn + "[weft]\n" + yarn},
   };
   for (const Model& model : models) {
@@ -136,11 +140,13 @@ TEST(ConfigDocumentation, NamesEveryKeyOfAScene) {
   // What no scene of ours holds.
   const std::string more =
       "[[mesh]]\nmesh = \"../meshes/drape_sphere_64.obj\"\nmesh_unit = \"m\"\n"
-      "[[cloth]]\nflat_mm = [1, 1]\nfabric = \"../fabrics/cotton-tiny.toml\"\nfar_surface = \"silk-shot\"\n";
+      "[[cloth]]\nflat_mm = [1, 1]\nfabric = \"../fabrics/cotton-tiny.toml\"\nfar_surface = "
+      "\"silk-shot\"\n";
   std::ifstream stream(kConfigs / "scenes" / "ci.toml");
   std::stringstream text;
   text << stream.rdbuf() << more;
-  const TomlTable document = TomlTable::parse(text.str(), (kConfigs / "scenes" / "ci.toml").string());
+  const TomlTable document =
+      TomlTable::parse(text.str(), (kConfigs / "scenes" / "ci.toml").string());
   read_scene_config(document);
   add(document, asked);
   expect_equal(asked, documented("Scenes"));

@@ -1,5 +1,5 @@
-// The built program as a user runs it: same bytes whatever the threads, the cache, the shards and the kills; what it says
-// of broken input, and with which exit status.
+// The built program as a user runs it: same bytes whatever the threads, the cache, the shards and
+// the kills; what it says of broken input, and with which exit status.
 
 #include <gtest/gtest.h>
 
@@ -31,7 +31,8 @@ using Arguments = std::vector<std::string>;
 std::map<std::string, std::string> files_of(const fs::path& folder) {
   std::map<std::string, std::string> files;
   for (const auto& entry : fs::recursive_directory_iterator(folder)) {
-    if (entry.is_regular_file()) files[fs::relative(entry.path(), folder).string()] = text_of(entry.path());
+    if (entry.is_regular_file())
+      files[fs::relative(entry.path(), folder).string()] = text_of(entry.path());
   }
   return files;
 }
@@ -55,7 +56,8 @@ bool any_chunk_in(const fs::path& stage_folder) {
   std::error_code error;
   for (fs::recursive_directory_iterator entry(stage_folder, error), end; !error && entry != end;
        entry.increment(error)) {
-    if (entry->path().extension() == ".safetensors" && entry->path().parent_path().extension() == ".partial" &&
+    if (entry->path().extension() == ".safetensors" &&
+        entry->path().parent_path().extension() == ".partial" &&
         entry->path().filename().string().find("tmp") == std::string::npos) {
       return true;
     }
@@ -63,7 +65,8 @@ bool any_chunk_in(const fs::path& stage_folder) {
   return false;
 }
 
-/// A folder with the small fabric and its scene, in which the program is run with a cache of its own.
+/// A folder with the small fabric and its scene, in which the program is run with a cache of its
+/// own.
 class Workshop {
  public:
   Workshop() {
@@ -75,7 +78,8 @@ class Workshop {
   /// Arguments with their file names (those that hold a dot, or "pack") made absolute.
   Arguments absolute(Arguments arguments) const {
     for (std::size_t k = 1; k < arguments.size(); ++k) {
-      if (arguments[k] == "pack" || arguments[k].find('.') != std::string::npos) arguments[k] = *this / arguments[k];
+      if (arguments[k] == "pack" || arguments[k].find('.') != std::string::npos)
+        arguments[k] = *this / arguments[k];
     }
     return arguments;
   }
@@ -106,7 +110,8 @@ void expect_same_bytes_after_kill(const fs::path& reference, const std::string& 
   const Workshop shop;
   const fs::path chunks = shop / "cache" / stage;
   Program program = shop.start(kPrecompute);
-  ASSERT_TRUE(program.signal_when([&] { return any_chunk_in(chunks); }, SIGKILL)) << program.wait().error;
+  ASSERT_TRUE(program.signal_when([&] { return any_chunk_in(chunks); }, SIGKILL))
+      << program.wait().error;
   ASSERT_EQ(program.wait().status, -SIGKILL);
   ASSERT_TRUE(any_chunk_in(chunks)) << "the stage was over before it was killed";
 
@@ -125,18 +130,22 @@ TEST(StagesEndToEnd, SameBytesHoweverTheJobIsRun) {
   const fs::path reference = shop / "pack";
   const Json cold = shop.report({"precompute", "fabric.toml", "-o", "pack", "--threads", "2"});
   EXPECT_GE(cold.at("stages").size(), 6U);
-  for (const Json& stage : cold.at("stages")) EXPECT_TRUE(stage.at("built").get<bool>()) << stage.dump();
+  for (const Json& stage : cold.at("stages"))
+    EXPECT_TRUE(stage.at("built").get<bool>()) << stage.dump();
   {
     SCOPED_TRACE("warm cache");
     const Json warm = shop.report({"precompute", "fabric.toml"});
-    EXPECT_EQ(warm.at("stages").size(), 2U) << "the fibers and the pack; what the pack holds is not asked for";
-    for (const Json& stage : warm.at("stages")) EXPECT_FALSE(stage.at("built").get<bool>()) << stage.dump();
+    EXPECT_EQ(warm.at("stages").size(), 2U)
+        << "the fibers and the pack; what the pack holds is not asked for";
+    for (const Json& stage : warm.at("stages"))
+      EXPECT_FALSE(stage.at("built").get<bool>()) << stage.dump();
   }
   {
     SCOPED_TRACE("another dye keeps the visibility");
     const std::string color = "[0.2, 0.3, 0.4]";
     std::string dyed = kSmallFabric;
-    std::ofstream(shop / "dyed.toml") << dyed.replace(dyed.find(color), color.size(), "[0.9, 0.1, 0.1]");
+    std::ofstream(shop / "dyed.toml")
+        << dyed.replace(dyed.find(color), color.size(), "[0.9, 0.1, 0.1]");
     const Json report = shop.report({"visibility", "dyed.toml"});
     for (const Json& stage : report.at("stages")) {
       EXPECT_EQ(stage.at("built").get<bool>(), stage.at("stage") == "synth") << stage.dump();
@@ -146,10 +155,12 @@ TEST(StagesEndToEnd, SameBytesHoweverTheJobIsRun) {
     SCOPED_TRACE("one thread, two shards each");
     const Workshop other;
     for (const char* stage : {"visibility", "transfer"}) {
-      for (const char* shard : {"1/2", "2/2"}) other.report({stage, "fabric.toml", "--shard", shard, "-j", "1"});
+      for (const char* shard : {"1/2", "2/2"})
+        other.report({stage, "fabric.toml", "--shard", shard, "-j", "1"});
     }
     const Json report = other.report({"precompute", "fabric.toml", "-o", "pack", "-j", "1"});
-    for (const Json& stage : report.at("stages")) EXPECT_EQ(stage.at("chunks_built"), 0) << stage.dump();
+    for (const Json& stage : report.at("stages"))
+      EXPECT_EQ(stage.at("chunks_built"), 0) << stage.dump();
     EXPECT_EQ(differences(reference, other / "pack"), std::vector<std::string>{});
   }
   expect_same_bytes_after_kill(reference, "maps");
@@ -161,7 +172,8 @@ TEST(StagesEndToEnd, SignalsEndWithTheirStatusAndKeepChunks) {
   for (const auto& [signal_number, status] : {std::pair{SIGINT, 130}, std::pair{SIGTERM, 143}}) {
     fs::remove_all(shop / "cache");
     Program program = shop.start({"visibility", "fabric.toml"});
-    ASSERT_TRUE(program.signal_when([&] { return any_chunk_in(shop / "cache" / "maps"); }, signal_number));
+    ASSERT_TRUE(
+        program.signal_when([&] { return any_chunk_in(shop / "cache" / "maps"); }, signal_number));
     const ProgramResult result = program.wait();
     EXPECT_EQ(result.status, status) << result.error;
     EXPECT_NE(result.error.find("interrupted"), std::string::npos) << result.error;
@@ -179,9 +191,10 @@ TEST(PackEndToEnd, DamagedPacksAreRefused) {
   fs::rename(shop / "pack", shop / "sound");
   int refused = 0;
   for (const auto& [name, bytes] : files_of(shop / "sound")) {
-    std::vector<std::pair<std::string, std::string>> damages = {{"empty", ""},
-                                                                {"cut in half", bytes.substr(0, bytes.size() / 2)},
-                                                                {"cut by a byte", bytes.substr(0, bytes.size() - 1)}};
+    std::vector<std::pair<std::string, std::string>> damages = {
+        {"empty", ""},
+        {"cut in half", bytes.substr(0, bytes.size() / 2)},
+        {"cut by a byte", bytes.substr(0, bytes.size() - 1)}};
     for (const double place : {0.0, 0.1, 0.37, 0.5, 0.81, 0.99}) {
       std::string flipped = bytes;
       flipped[static_cast<std::size_t>(place * static_cast<double>(bytes.size()))] ^= 0x10;
@@ -210,15 +223,18 @@ TEST(PackEndToEnd, NumpyAloneOpensAPack) {
   const std::string fence = "```python\n";
   const std::size_t begin = readme.find(fence);
   ASSERT_NE(begin, std::string::npos);
-  const std::string snippet = readme.substr(begin + fence.size(), readme.find("```", begin + 3) - begin - fence.size());
+  const std::string snippet =
+      readme.substr(begin + fence.size(), readme.find("```", begin + 3) - begin - fence.size());
 
   fs::create_directories(shop / "cotton.pack");
   for (const auto& [name, bytes] : files_of(shop / "cache" / "synth")) {
     std::ofstream(shop / "cotton.pack" / "fibers.safetensors", std::ios::binary) << bytes;
   }
-  std::ofstream(shop / "snippet.py")
-      << snippet << "print(tensors['points_mm'].shape[1], round(1000 * float(tensors['radius_mm'].min()), 3))\n";
-  const std::string command = "cd '" + (shop / "").string() + "' && /usr/bin/python3 snippet.py > printed.txt 2>&1";
+  std::ofstream(shop / "snippet.py") << snippet
+                                     << "print(tensors['points_mm'].shape[1], round(1000 * "
+                                        "float(tensors['radius_mm'].min()), 3))\n";
+  const std::string command =
+      "cd '" + (shop / "").string() + "' && /usr/bin/python3 snippet.py > printed.txt 2>&1";
   EXPECT_EQ(std::system(command.c_str()), 0) << text_of(shop / "printed.txt");
   EXPECT_EQ(text_of(shop / "printed.txt").substr(0, 5), "3 10.") << text_of(shop / "printed.txt");
 }
@@ -228,13 +244,15 @@ TEST(PicturesEndToEnd, SameBytesForOneAndTwoThreadsAndNothingTwice) {
   const Json first = shop.report({"run", "scene.toml", "-o", "pictures.2", "-j", "2"});
   EXPECT_GE(first.at("artifacts").size(), 3U) << "picture, reference, difference";
   const Json again = shop.report({"run", "scene.toml", "-o", "pictures.again"});
-  for (const Json& stage : again.at("stages")) EXPECT_FALSE(stage.at("built").get<bool>()) << stage.dump();
+  for (const Json& stage : again.at("stages"))
+    EXPECT_FALSE(stage.at("built").get<bool>()) << stage.dump();
 
   fs::remove_all(shop / "cache" / "picture");
   shop.report({"run", "scene.toml", "-o", "pictures.1", "-j", "1"});
   for (const auto& [name, bytes] : files_of(shop / "pictures.2")) {
     EXPECT_EQ(text_of(shop / "pictures.again" / name), bytes) << name;
-    const bool has_timings = name.ends_with(".json") && name.find("difference") == std::string::npos;
+    const bool has_timings =
+        name.ends_with(".json") && name.find("difference") == std::string::npos;
     if (!has_timings) {
       EXPECT_EQ(text_of(shop / "pictures.1" / name), bytes) << name;
     }
@@ -244,9 +262,10 @@ TEST(PicturesEndToEnd, SameBytesForOneAndTwoThreadsAndNothingTwice) {
   ASSERT_EQ(shop.run({"render", "scene.toml", "-o", "volume.exr", "--method", "volume"}).status, 0);
   ASSERT_EQ(shop.run({"render", "scene.toml", "-o", "exact.exr"}).status, 0);
   EXPECT_EQ(text_of(shop / "exact.exr"), text_of(shop / "pictures.2" / "scene.exr"));
-  ASSERT_EQ(
-      shop.run({"render", "scene.toml", "-o", "crop.exr", "--crop", "4,4,12,10", "--method", "path", "--local"}).status,
-      0);
+  ASSERT_EQ(shop.run({"render", "scene.toml", "-o", "crop.exr", "--crop", "4,4,12,10", "--method",
+                      "path", "--local"})
+                .status,
+            0);
   EXPECT_EQ(shop.run({"compare", "volume.exr", "exact.exr", "-o", "difference.exr"}).status, 0);
   EXPECT_EQ(shop.run({"compare", "volume.exr", "exact.exr", "--max-rmse", "0"}).status, 1);
   EXPECT_EQ(shop.run({"compare", "volume.exr", "crop.exr"}).status, 2);
@@ -263,9 +282,11 @@ std::string edited(const char* original, const std::string& from, const std::str
 
 /// The small scene with a square of 3 mm below its cloth that a surface model draws.
 std::string scene_with_surface(const Workshop& shop, const std::string& surface) {
-  std::ofstream(shop / "square.obj") << "v -1.5 -1.5 -0.5\nv 1.5 -1.5 -0.5\nv 1.5 1.5 -0.5\nv -1.5 1.5 -0.5\n"
-                                        "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n";
-  return "[[cloth]]\nmesh = \"square.obj\"\nmesh_unit = \"mm\"\nuv_size_mm = 3\nsurface = \"" + surface + "\"\n";
+  std::ofstream(shop / "square.obj")
+      << "v -1.5 -1.5 -0.5\nv 1.5 -1.5 -0.5\nv 1.5 1.5 -0.5\nv -1.5 1.5 -0.5\n"
+         "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n";
+  return "[[cloth]]\nmesh = \"square.obj\"\nmesh_unit = \"mm\"\nuv_size_mm = 3\nsurface = \"" +
+         surface + "\"\n";
 }
 
 TEST(SurfacesEndToEnd, SurfaceBesideFibersInEveryMethod) {
@@ -280,8 +301,8 @@ TEST(SurfacesEndToEnd, SurfaceBesideFibersInEveryMethod) {
   std::ofstream(shop / "over.toml") << scene("4");
   for (const char* method : {"exact", "volume", "path"}) {
     const auto render = [&](const std::string& name) {
-      const ProgramResult result =
-          shop.run({"render", name + ".toml", "-o", name + ".exr", "--method", method, "--spp", "4"});
+      const ProgramResult result = shop.run(
+          {"render", name + ".toml", "-o", name + ".exr", "--method", method, "--spp", "4"});
       EXPECT_EQ(result.status, 0) << method << ": " << result.error;
       return read_exr(shop / (name + ".exr"));
     };
@@ -291,7 +312,8 @@ TEST(SurfacesEndToEnd, SurfaceBesideFibersInEveryMethod) {
     const auto blue = [](const Image& image, int column) {
       float sum = 0;
       for (int k = 0; k < 36; ++k)
-        sum += image.channels.at("B").values[static_cast<std::size_t>((6 + k / 3) * 24 + column + k % 3)];
+        sum += image.channels.at("B")
+                   .values[static_cast<std::size_t>((6 + k / 3) * 24 + column + k % 3)];
       return sum / 36;
     };
     EXPECT_GT(blue(beside, 1), 0.1F) << method << ": linen in the light";
@@ -308,7 +330,8 @@ TEST(SurfacesEndToEnd, SurfaceBesideFibersInEveryMethod) {
 
 TEST(SurfacesEndToEnd, SurfacesAloneNeedNoStagesAndAnEditedOneMakesANewPicture) {
   const Workshop shop;
-  const std::string preset = text_of(fs::path(HEDDLE_SOURCE_DIR) / "configs/fabrics/linen-plain.toml");
+  const std::string preset =
+      text_of(fs::path(HEDDLE_SOURCE_DIR) / "configs/fabrics/linen-plain.toml");
   std::ofstream(shop / "own.toml") << preset;
   std::string scene = kSmallScene;
   const std::string fibers = "[[cloth]]\nflat_mm = [4, 4]\nfabric = \"fabric.toml\"\n";
@@ -327,24 +350,28 @@ TEST(SurfacesEndToEnd, SurfacesAloneNeedNoStagesAndAnEditedOneMakesANewPicture) 
   for (const char* name : {"alone.exr", "alone-reference.exr"}) {
     EXPECT_EQ(text_of(shop / "pictures.1" / name), text_of(shop / "pictures.2" / name)) << name;
   }
-  for (const auto& entry : fs::directory_iterator(shop / "cache")) EXPECT_EQ(entry.path().filename(), "picture");
+  for (const auto& entry : fs::directory_iterator(shop / "cache"))
+    EXPECT_EQ(entry.path().filename(), "picture");
 
   std::ofstream(shop / "own.toml") << "# comments change nothing\n" << preset;
   EXPECT_FALSE(built("2", "pictures.again"));
   std::ofstream(shop / "own.toml") << edited(preset.c_str(), "kd = 0.3", "kd = 0.4");
   EXPECT_TRUE(built("2", "pictures.edited"));
-  EXPECT_NE(text_of(shop / "pictures.edited" / "alone.exr"), text_of(shop / "pictures.2" / "alone.exr"));
+  EXPECT_NE(text_of(shop / "pictures.edited" / "alone.exr"),
+            text_of(shop / "pictures.2" / "alone.exr"));
 
   const Json info = shop.report({"info", "own.toml"});
   EXPECT_EQ(info.at("model"), "microcylinder");
   EXPECT_EQ(shop.report({"info", "alone.toml"}).at("fabrics").at(0), "own.toml");
 }
 
-// A strip of 1 mm hangs 1 mm over a square of 4 mm, light comes at 45 degrees: its shadow lies on x from -1.5 to -0.5.
+// A strip of 1 mm hangs 1 mm over a square of 4 mm, light comes at 45 degrees: its shadow lies on x
+// from -1.5 to -0.5.
 TEST(SurfacesEndToEnd, StackedClothsShadowEachOther) {
   const Workshop shop;
-  std::ofstream(shop / "strip.obj") << "v -0.5 -2 1\nv 0.5 -2 1\nv 0.5 2 1\nv -0.5 2 1\n"
-                                       "vt -0.5 -2\nvt 0.5 -2\nvt 0.5 2\nvt -0.5 2\nf 1/1 2/2 3/3 4/4\n";
+  std::ofstream(shop / "strip.obj")
+      << "v -0.5 -2 1\nv 0.5 -2 1\nv 0.5 2 1\nv -0.5 2 1\n"
+         "vt -0.5 -2\nvt 0.5 -2\nvt 0.5 2\nvt -0.5 2\nf 1/1 2/2 3/3 4/4\n";
   const std::string start = R"(name = "stack"
 [camera]
 position_mm = [0, 0, 8]
@@ -374,10 +401,12 @@ spp = 16
   for (const auto& [name, cloths] : scenes) {
     std::ofstream(shop / name) << start + cloths;
     for (const char* method : {"exact", "volume", "path"}) {
-      const ProgramResult result = shop.run({"render", name, "-o", "stack.exr", "--method", method});
+      const ProgramResult result =
+          shop.run({"render", name, "-o", "stack.exr", "--method", method});
       ASSERT_EQ(result.status, 0) << name << ": " << result.error;
       const Image image = read_exr(shop / "stack.exr");
-      // Light scattered once, mean over two columns and four rows of the middle. (Multiple scattering blurs the edge of a shadow.)
+      // Light scattered once, mean over two columns and four rows of the middle. (Multiple
+      // scattering blurs the edge of a shadow.)
       const auto green = [&](int column) {
         float sum = 0;
         for (int row = 6; row < 10; ++row) {
@@ -386,7 +415,8 @@ spp = 16
         }
         return sum / 8;
       };
-      // 0.28 mm per pixel: columns from -1.4 to -0.8, and from 1.1 to 1.65; the strip covers 6 to 9.
+      // 0.28 mm per pixel: columns from -1.4 to -0.8, and from 1.1 to 1.65; the strip covers 6
+      // to 9.
       const float shadow = green(3);
       const float lit = green(12);
       const float top = green(7);
@@ -413,7 +443,8 @@ spp = 16
 
 TEST(SurfacesEndToEnd, ThreadsLightsAndCamerasAreEditedWithoutPrecomputingAgain) {
   const Workshop shop;
-  const std::string threads = text_of(fs::path(HEDDLE_SOURCE_DIR) / "configs/fabrics/linen-plain.toml");
+  const std::string threads =
+      text_of(fs::path(HEDDLE_SOURCE_DIR) / "configs/fabrics/linen-plain.toml");
   std::ofstream(shop / "own.toml") << threads;
   std::string scene = kSmallScene;
   scene.replace(scene.find("[4, 4]"), 6, "[0.2, 4]");
@@ -426,12 +457,14 @@ TEST(SurfacesEndToEnd, ThreadsLightsAndCamerasAreEditedWithoutPrecomputingAgain)
     const Json report = shop.report({"run", "edited.toml", "-o", folder});
     for (const Json& entry : report.at("stages")) {
       const auto stage = entry.at("stage").get<std::string>();
-      if ((stage.starts_with("surface") || stage == "edited") && entry.at("built").get<bool>()) stages.insert(stage);
+      if ((stage.starts_with("surface") || stage == "edited") && entry.at("built").get<bool>())
+        stages.insert(stage);
     }
     return stages;
   };
   using Stages = std::multiset<std::string>;
-  EXPECT_EQ(built("pictures.first"), (Stages{"surface-weights", "surface-maps", "surface-maps", "edited"}));
+  EXPECT_EQ(built("pictures.first"),
+            (Stages{"surface-weights", "surface-maps", "surface-maps", "edited"}));
   EXPECT_EQ(built("pictures.again"), Stages{});
 
   std::string other = threads;
@@ -444,17 +477,20 @@ TEST(SurfacesEndToEnd, ThreadsLightsAndCamerasAreEditedWithoutPrecomputingAgain)
   }
   std::ofstream(shop / "own.toml") << other;
   EXPECT_EQ(built("pictures.threads"), Stages{"edited"});
-  EXPECT_NE(text_of(shop / "pictures.threads" / "edited.exr"), text_of(shop / "pictures.first" / "edited.exr"));
+  EXPECT_NE(text_of(shop / "pictures.threads" / "edited.exr"),
+            text_of(shop / "pictures.first" / "edited.exr"));
 
-  scene = edited(edited(scene.c_str(), "fov_deg = 25", "fov_deg = 30").c_str(), "sharpness = 15", "sharpness = 50");
+  scene = edited(edited(scene.c_str(), "fov_deg = 25", "fov_deg = 30").c_str(), "sharpness = 15",
+                 "sharpness = 50");
   std::ofstream(shop / "edited.toml") << scene + "surface_method = \"interactive\"\n";
   EXPECT_EQ(built("pictures.lights"), Stages{"edited"});
 
   // A curve is another table; what stands over the cloth makes other maps.
-  std::ofstream(shop / "own.toml") << edited(other.c_str(), "offsets_deg = [-25, 25]", "offsets_deg = [-20, 20]");
+  std::ofstream(shop / "own.toml")
+      << edited(other.c_str(), "offsets_deg = [-25, 25]", "offsets_deg = [-20, 20]");
   EXPECT_EQ(built("pictures.curves"), (Stages{"surface-weights", "edited"}));
-  std::ofstream(shop / "edited.toml") << edited(scene.c_str(), "[0.2, 4]", "[0.4, 4]") +
-                                             "surface_method = \"interactive\"\n";
+  std::ofstream(shop / "edited.toml")
+      << edited(scene.c_str(), "[0.2, 4]", "[0.4, 4]") + "surface_method = \"interactive\"\n";
   EXPECT_EQ(built("pictures.shapes"), (Stages{"surface-maps", "surface-maps", "edited"}));
 
   // Sampled, nothing of it is asked for.
@@ -465,20 +501,24 @@ TEST(SurfacesEndToEnd, ThreadsLightsAndCamerasAreEditedWithoutPrecomputingAgain)
 
 TEST(RivalsEndToEnd, EveryMethodRendersTheScene) {
   const Workshop shop;
-  for (const char* method : {"path-6", "printed", "prt", "tsai-shih-16", "tsai-shih-full", "dual-scattering"}) {
+  for (const char* method :
+       {"path-6", "printed", "prt", "tsai-shih-16", "tsai-shih-full", "dual-scattering"}) {
     const std::string file = std::string(method) + ".exr";
-    const ProgramResult result =
-        shop.run({"render", "scene.toml", "-o", file, "--method", method, "--crop", "8,8,14,14", "--spp", "2"});
+    const ProgramResult result = shop.run({"render", "scene.toml", "-o", file, "--method", method,
+                                           "--crop", "8,8,14,14", "--spp", "2"});
     EXPECT_EQ(result.status, 0) << method << ": " << result.error;
   }
   // Six scattering events are what the path tracer's own limit says.
-  ASSERT_EQ(shop.run({"render", "scene.toml", "-o", "limited.exr", "--method", "path", "--bounces", "6", "--crop",
-                      "8,8,14,14", "--spp", "2"})
+  ASSERT_EQ(shop.run({"render", "scene.toml", "-o", "limited.exr", "--method", "path", "--bounces",
+                      "6", "--crop", "8,8,14,14", "--spp", "2"})
                 .status,
             0);
   EXPECT_EQ(shop.run({"compare", "limited.exr", "path-6.exr", "--max-rmse", "0"}).status, 0);
   EXPECT_EQ(shop.run({"compare", "prt.exr", "tsai-shih-full.exr", "--max-rmse", "0"}).status, 1);
-  EXPECT_EQ(shop.run({"render", "scene.toml", "-o", "x.exr", "--method", "path-6", "--bounces", "3"}).status, 2);
+  EXPECT_EQ(
+      shop.run({"render", "scene.toml", "-o", "x.exr", "--method", "path-6", "--bounces", "3"})
+          .status,
+      2);
 }
 
 struct BadInput {
@@ -497,11 +537,14 @@ TEST(InputEndToEnd, BadInputIsNamed) {
       {"missing key", synth, edited(kSmallFabric, "radius_um = 10\n", ""), 2, "radius_um"},
       {"missing section", synth, edited(kSmallFabric, "[volume]\n", ""), 2, "volume"},
       {"wrong type", synth, edited(kSmallFabric, "plies = 1", "plies = \"one\""), 2, "plies"},
-      {"wrong unit", synth, edited(kSmallFabric, "radius_um = 10", "radius_mm = 0.01"), 2, "radius_um"},
-      {"out of range", synth, edited(kSmallFabric, "beta_r_deg = 5", "beta_r_deg = 500"), 2, "beta_r_deg"},
+      {"wrong unit", synth, edited(kSmallFabric, "radius_um = 10", "radius_mm = 0.01"), 2,
+       "radius_um"},
+      {"out of range", synth, edited(kSmallFabric, "beta_r_deg = 5", "beta_r_deg = 500"), 2,
+       "beta_r_deg"},
       {"NaN", synth, edited(kSmallFabric, "beta_r_deg = 5", "beta_r_deg = nan"), 2, "beta_r_deg"},
       {"bad notation", synth, edited(kSmallFabric, "\"plain\"", "\"plaid\""), 2, "bad.toml:6:"},
-      {"unknown fiber", synth, edited(kSmallFabric, "fiber = \"thread\"", "fiber = \"wool\""), 2, "wool"},
+      {"unknown fiber", synth, edited(kSmallFabric, "fiber = \"thread\"", "fiber = \"wool\""), 2,
+       "wool"},
       {"unknown surface",
        {"render", "bad.toml", "-o", "x.exr"},
        edited(kSmallScene, "fabric = \"fabric.toml\"", "surface = \"linen\""),
@@ -528,12 +571,14 @@ TEST(InputEndToEnd, BadInputIsNamed) {
   }
 }
 
-/// A table under which signed distances alone are as good as both forms of visibility, larger cells too, and everything faster
-/// than paths; where the small fabric's own would lie. Makes plans without measuring for half a minute.
+/// A table under which signed distances alone are as good as both forms of visibility, larger cells
+/// too, and everything faster than paths; where the small fabric's own would lie. Makes plans
+/// without measuring for half a minute.
 void store_table(const Workshop& shop, double bias) {
   std::ostringstream silent;
   Console console(silent, false, true);
-  StageContext context{.cache = Cache(shop / "cache"), .console = &console, .seed = {}, .results = {}};
+  StageContext context{
+      .cache = Cache(shop / "cache"), .console = &console, .seed = {}, .results = {}};
   const fs::path path = FabricStages(shop / "fabric.toml", context).accuracy_place().path;
   AccuracyTable table;
   table.fabric = "small";
@@ -547,29 +592,34 @@ void store_table(const Workshop& shop, double bias) {
   table.through = 0.5;
   const auto add = [&](const std::string& name, double bias_of_this, double noise, double seconds) {
     const Accuracy entry{bias_of_this * bias_of_this, 0, noise * noise, 0, Rgbd::Ones()};
-    table.settings.push_back({name, seconds, 1e-3, std::vector<Accuracy>(4, entry), std::vector<Accuracy>(2, entry)});
+    table.settings.push_back(
+        {name, seconds, 1e-3, std::vector<Accuracy>(4, entry), std::vector<Accuracy>(2, entry)});
   };
   add("path", 0, 5, 1e-4);
   add("path-6", 1, 5, 1e-4);
   add("dual-scattering", 1, 5, 1e-4);
-  for (const char* name : {"exact", "signed distance", "cells x 2", "order 1"}) add(name, bias, 1, 1e-6);
-  for (const char* name : {"volume", "voxels x 0.5", "Gaussians", "cells x 4"}) add(name, 2, 1, 1e-6);
+  for (const char* name : {"exact", "signed distance", "cells x 2", "order 1"})
+    add(name, bias, 1, 1e-6);
+  for (const char* name : {"volume", "voxels x 0.5", "Gaussians", "cells x 4"})
+    add(name, 2, 1, 1e-6);
   // Enough that what data take decides between ways that are alike.
-  for (const auto& [part, seconds] : std::map<std::string, double>{{"maps", 0.01},
-                                                                   {"ssdf", 0.01},
-                                                                   {"sg", 0.2},
-                                                                   {"transfer", 0.1},
-                                                                   {"transfer, cells x 2", 0.02},
-                                                                   {"transfer, cells x 4", 0.01},
-                                                                   {"transfer, order 1", 0.1},
-                                                                   {"voxelize", 0.01},
-                                                                   {"voxelize, voxels x 0.5", 0.01}}) {
+  for (const auto& [part, seconds] :
+       std::map<std::string, double>{{"maps", 0.01},
+                                     {"ssdf", 0.01},
+                                     {"sg", 0.2},
+                                     {"transfer", 0.1},
+                                     {"transfer, cells x 2", 0.02},
+                                     {"transfer, cells x 4", 0.01},
+                                     {"transfer, order 1", 0.1},
+                                     {"voxelize", 0.01},
+                                     {"voxelize, voxels x 0.5", 0.01}}) {
     table.costs[part] = {seconds, seconds};
   }
-  publish_artifact(path, fs::path(path).replace_extension(".record.json"), [&](const fs::path& file) {
-    write_accuracy(file, table);
-    return BuildCost{};
-  });
+  publish_artifact(path, fs::path(path).replace_extension(".record.json"),
+                   [&](const fs::path& file) {
+                     write_accuracy(file, table);
+                     return BuildCost{};
+                   });
 }
 
 Json plan_of(const Workshop& shop, const char* tolerance, int status) {
@@ -589,8 +639,11 @@ TEST(PlanEndToEnd, SaysWhatItWouldDoAndBuildsNothing) {
   for (const char* stage : {"maps", "ssdf", "sg", "transfer", "voxelize"})
     EXPECT_FALSE(fs::exists(shop / "cache" / stage)) << stage;
   const ProgramResult text = shop.run({"plan", "scene.toml", "--tolerance", "4e-1"});
-  EXPECT_NE(text.out.find("choice    exact, signed distance, cells x 2"), std::string::npos) << text.out;
-  EXPECT_NE(text.out.find("light 2   sg, sharpness 15: visibility by signed distances"), std::string::npos) << text.out;
+  EXPECT_NE(text.out.find("choice    exact, signed distance, cells x 2"), std::string::npos)
+      << text.out;
+  EXPECT_NE(text.out.find("light 2   sg, sharpness 15: visibility by signed distances"),
+            std::string::npos)
+      << text.out;
 }
 
 TEST(PlanEndToEnd, TracesPathsWhereNothingElseIsGoodEnough) {
@@ -621,7 +674,8 @@ double bias_in(const Json& plan, const std::string& name) {
 TEST(PlanEndToEnd, LightFromOtherClothIsMissingFromFastMethods) {
   const Workshop shop;
   store_table(shop, 0.2);
-  // A wall of the same cloth beside what the picture shows, lit from the front; then the same one far away.
+  // A wall of the same cloth beside what the picture shows, lit from the front; then the same one
+  // far away.
   const auto plan_with_wall_at = [&](double x) {
     std::ofstream obj(shop / "wall.obj");
     for (const auto& [y, z] : {std::pair{-2, 0}, {2, 0}, {2, 3}, {-2, 3}}) {
@@ -629,16 +683,18 @@ TEST(PlanEndToEnd, LightFromOtherClothIsMissingFromFastMethods) {
     }
     obj << "f 1/1/1 2/2/2 3/3/3\nf 1/1/1 3/3/3 4/4/4\n";
     obj.close();
-    std::ofstream(shop / "scene.toml") << kSmallScene
-                                       << "\n[[cloth]]\nmesh = \"wall.obj\"\nmesh_unit = \"mm\"\nuv_size_mm = 1\n"
-                                          "fabric = \"fabric.toml\"\n";
+    std::ofstream(shop / "scene.toml")
+        << kSmallScene
+        << "\n[[cloth]]\nmesh = \"wall.obj\"\nmesh_unit = \"mm\"\nuv_size_mm = 1\n"
+           "fabric = \"fabric.toml\"\n";
     return plan_of(shop, "4e-1", 0);
   };
   const Json near = plan_with_wall_at(-0.4);
   const Json far = plan_with_wall_at(-400);
   EXPECT_GT(bias_in(near, "exact"), 1.1 * bias_in(far, "exact"));
   EXPECT_GT(bias_in(near, "dual-scattering"), bias_in(far, "dual-scattering"));
-  EXPECT_NEAR(bias_in(near, "path-6") / bias_in(far, "path-6"), 1, 0.01) << "traces light from everywhere";
+  EXPECT_NEAR(bias_in(near, "path-6") / bias_in(far, "path-6"), 1, 0.01)
+      << "traces light from everywhere";
   EXPECT_EQ(bias_in(near, "path"), 0);
 }
 
@@ -656,11 +712,12 @@ TEST(PlanEndToEnd, LightFromBehindIsMissingFromPrecomputedMethods) {
   // Errors of two lights are taken as half together and half apart.
   EXPECT_GT(bias_in(front, "exact"), 0.2 * std::sqrt(0.5));
   EXPECT_LT(bias_in(front, "exact"), 0.2 + 1e-6);
-  // Through the cloth comes 0.5 of 1 x 1 / |axis|, beside all of 3 x 1 / |direction| on the face: that share of the light is missing,
-  // everywhere alike.
+  // Through the cloth comes 0.5 of 1 x 1 / |axis|, beside all of 3 x 1 / |direction| on the face:
+  // that share of the light is missing, everywhere alike.
   const double through = 0.5 * 1 / std::sqrt(1.41);
   const double missing = through / (through + 3 / std::sqrt(1.13));
-  EXPECT_GT(bias_in(behind, "exact"), std::hypot(0.95 * 0.2, missing)) << "nearly all light that is not missing is of one light";
+  EXPECT_GT(bias_in(behind, "exact"), std::hypot(0.95 * 0.2, missing))
+      << "nearly all light that is not missing is of one light";
   // A few pixels see between the fibers; the picture's mean is so much lower than the cloth's.
   const double gaps = 1.02;
   EXPECT_LT(bias_in(behind, "exact"), gaps * std::hypot(0.2, missing));
@@ -674,11 +731,14 @@ TEST(PlanEndToEnd, SaysWhatIsOutOfReach) {
   const Json plan = plan_of(shop, "1e-5", 1);
   EXPECT_TRUE(plan.at("choice").is_null());
   EXPECT_GT(plan.at("best_tolerance"), 0.00001);
-  const ProgramResult result = shop.run({"render", "scene.toml", "-o", "out.exr", "--tolerance", "1e-5"});
+  const ProgramResult result =
+      shop.run({"render", "scene.toml", "-o", "out.exr", "--tolerance", "1e-5"});
   EXPECT_EQ(result.status, 1);
   EXPECT_NE(result.error.find("no way meets this tolerance"), std::string::npos) << result.error;
   EXPECT_FALSE(fs::exists(shop / "out.exr"));
-  EXPECT_EQ(shop.run({"render", "scene.toml", "-o", "out.exr", "--tolerance", "4e-1", "--spp", "4"}).status, 2);
+  EXPECT_EQ(shop.run({"render", "scene.toml", "-o", "out.exr", "--tolerance", "4e-1", "--spp", "4"})
+                .status,
+            2);
 }
 
 TEST(RenderEndToEnd, WithinTheToleranceFromWhatWasPlanned) {
@@ -689,14 +749,16 @@ TEST(RenderEndToEnd, WithinTheToleranceFromWhatWasPlanned) {
   scene.replace(scene.find("[24, 24]"), 8, "[56, 56]");
   std::ofstream(shop / "scene.toml") << scene;
   // Of many pictures, so that no other work on the machine makes paths the cheaper way.
-  const Json report = shop.report({"render", "scene.toml", "-o", "out.exr", "--tolerance", "12e-1", "--pictures", "100"});
+  const Json report = shop.report(
+      {"render", "scene.toml", "-o", "out.exr", "--tolerance", "12e-1", "--pictures", "100"});
   ASSERT_TRUE(report.contains("plan"));
   std::set<std::string> built;
   for (const Json& stage : report.at("stages")) {
     if (stage.at("built")) built.insert(stage.at("stage").get<std::string>());
   }
   if (report.at("plan").at("choice").at("method") != "path") {
-    // What the choice needs, and nothing else: no volume, sums of Gaussians only for a light that takes them.
+    // What the choice needs, and nothing else: no volume, sums of Gaussians only for a light that
+    // takes them.
     std::set<std::string> needed = {"maps", "ssdf", "transfer", "pack"};
     for (const Json& light : report.at("plan").at("choice").at("lights")) {
       if (light.at("visibility") != "signed distances") needed.insert("sg");
@@ -705,10 +767,10 @@ TEST(RenderEndToEnd, WithinTheToleranceFromWhatWasPlanned) {
   } else {
     ADD_FAILURE() << "the table says that paths are dear: " << report.at("plan").dump(1);
   }
-  ASSERT_EQ(
-      shop.run({"render", "scene.toml", "-o", "reference.exr", "--method", "path", "--spp", "64", "--seed", "77"})
-          .status,
-      0);
+  ASSERT_EQ(shop.run({"render", "scene.toml", "-o", "reference.exr", "--method", "path", "--spp",
+                      "64", "--seed", "77"})
+                .status,
+            0);
   const Json error = shop.report({"compare", "out.exr", "reference.exr"});
   EXPECT_LE(error.at("relative_rmse"), 1.2);
   EXPECT_LE(report.at("expected_error"), 1.2);
@@ -718,7 +780,8 @@ TEST(RenderEndToEnd, MoreSamplesMakeThePictureOfAll) {
   const Workshop shop;
   std::ostringstream silent;
   Console console(silent, false, true);
-  StageContext context{.cache = Cache(shop / "cache"), .console = &console, .seed = {}, .results = {}};
+  StageContext context{
+      .cache = Cache(shop / "cache"), .console = &console, .seed = {}, .results = {}};
   SceneJob job(shop / "scene.toml", context);
   for (const RenderMethod method : {RenderMethod::kPath, RenderMethod::kExact}) {
     PictureRequest request = job.request(find_view(job.config(), ""));

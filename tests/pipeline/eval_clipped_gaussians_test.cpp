@@ -33,7 +33,8 @@ double value_of(const Json& request) {
 TEST(EvalClippedGaussians, MethodsAgreeWithinTheirErrors) {
   const double scale = kPi * 0.1 * 0.2;
   const double exact = value_of(request_of("quadrature"));
-  // Narrow Gaussians far from the border: pi s s' (1 + erf(d / S)) / 2, up to the difference of gc and g.
+  // Narrow Gaussians far from the border: pi s s' (1 + erf(d / S)) / 2, up to the difference of gc
+  // and g.
   const double spread = std::hypot(0.1 * std::cos(kPi / 6), 0.2 * std::sin(kPi / 6));
   EXPECT_NEAR(exact, scale * 0.5 * (1 + std::erf(0.05 / spread)), 0.01 * scale);
   EXPECT_NEAR(value_of(request_of("default")), exact, 1e-5 * scale);
@@ -46,8 +47,8 @@ TEST(EvalClippedGaussiansLaw, EveryLineOfTheSameSideIsTheWhole) {
   for (const char* method : {"quadrature", "default"}) {
     Json request = request_of(method);
     request["distance"] = 10;
-    const double whole =
-        circular_gaussian_mass({0.3, 0.1}, -kPi / 2, kPi / 2) * circular_gaussian_mass({-0.4, 0.2}, -kPi / 2, kPi / 2);
+    const double whole = circular_gaussian_mass({0.3, 0.1}, -kPi / 2, kPi / 2) *
+                         circular_gaussian_mass({-0.4, 0.2}, -kPi / 2, kPi / 2);
     EXPECT_NEAR(value_of(request), whole, 1e-5 * whole);
     request["distance"] = -10;
     EXPECT_EQ(value_of(request), 0);
@@ -69,7 +70,8 @@ TEST(EvalClippedGaussiansStability, ExtremesAreFinite) {
 }
 
 TEST(EvalClippedGaussiansFormat, ErrorsNameTheField) {
-  for (const char* field : {"theta_l", "phi_k", "sigma_l", "sigma_k", "distance", "gradient_deg", "method"}) {
+  for (const char* field :
+       {"theta_l", "phi_k", "sigma_l", "sigma_k", "distance", "gradient_deg", "method"}) {
     Json request = request_of("default");
     request.erase(field);
     EXPECT_NE(answer(request).value("error", std::string()).find(field), std::string::npos);

@@ -24,16 +24,21 @@ std::string error_of(const Json& request) {
 }
 
 Json thread_request() {
-  return {
-      {"quantity", "thread"},
-      {"thread", {{"ior", 1.345}, {"albedo", {.12, .114, .006}}, {"kd", .2}, {"gamma_s_deg", 5}, {"gamma_v_deg", 10}}},
-      {"theta_i_deg", 85},
-      {"phi_i_deg", 0},
-      {"theta_o_deg", -85},
-      {"phi_o_deg", 0}};
+  return {{"quantity", "thread"},
+          {"thread",
+           {{"ior", 1.345},
+            {"albedo", {.12, .114, .006}},
+            {"kd", .2},
+            {"gamma_s_deg", 5},
+            {"gamma_v_deg", 10}}},
+          {"theta_i_deg", 85},
+          {"phi_i_deg", 0},
+          {"theta_o_deg", -85},
+          {"phi_o_deg", 0}};
 }
 
-// Mirror direction: theta_h = phi_d = 0, so that both Gaussians are at their peaks and theta_d = theta_i.
+// Mirror direction: theta_h = phi_d = 0, so that both Gaussians are at their peaks and theta_d =
+// theta_i.
 TEST(EvalThread, MirrorDirectionByHand) {
   const double theta = radians(85);
   const double inside = std::asin(std::sin(theta) / 1.345);
@@ -42,7 +47,8 @@ TEST(EvalThread, MirrorDirectionByHand) {
   const double reflected = .5 * (s + p);
   const double height = 1 / std::sqrt(2 * kPi);
   const double surface = reflected * height / radians(5);
-  const double volume = std::pow(1 - reflected, 2) * (.8 * height / radians(10) + .2) / (2 * std::cos(theta));
+  const double volume =
+      std::pow(1 - reflected, 2) * (.8 * height / radians(10) + .2) / (2 * std::cos(theta));
   const std::vector<double> value = value_of(thread_request());
   const double albedo[] = {.12, .114, .006};
   for (std::size_t k = 0; k < 3; ++k) {
@@ -54,23 +60,29 @@ TEST(EvalThread, MirrorDirectionByHand) {
 
 TEST(EvalThreadLaw, IsReciprocal) {
   Json forth = thread_request();
-  forth["theta_i_deg"] = 20, forth["phi_i_deg"] = 170, forth["theta_o_deg"] = -43, forth["phi_o_deg"] = -160;
+  forth["theta_i_deg"] = 20, forth["phi_i_deg"] = 170, forth["theta_o_deg"] = -43,
+  forth["phi_o_deg"] = -160;
   Json back = forth;
-  back["theta_i_deg"] = -43, back["phi_i_deg"] = -160, back["theta_o_deg"] = 20, back["phi_o_deg"] = 170;
+  back["theta_i_deg"] = -43, back["phi_i_deg"] = -160, back["theta_o_deg"] = 20,
+  back["phi_o_deg"] = 170;
   EXPECT_EQ(value_of(forth), value_of(back));
 }
 
 Json linen() {
-  const Json thread = {{"direction", 1}, {"share", .33},      {"ior", 1.46},       {"albedo", {.06, .24, .3}},
-                       {"kd", .3},       {"gamma_s_deg", 12}, {"gamma_v_deg", 24}, {"offsets_deg", {-25, 25}},
-                       {"lengths", {1}}};
+  const Json thread = {
+      {"direction", 1}, {"share", .33},      {"ior", 1.46},       {"albedo", {.06, .24, .3}},
+      {"kd", .3},       {"gamma_s_deg", 12}, {"gamma_v_deg", 24}, {"offsets_deg", {-25, 25}},
+      {"lengths", {1}}};
   Json other = thread;
   other["direction"] = 2;
   return {{"model", "microcylinder"}, {"thread", {thread, other}}};
 }
 
 Json request_for(const Json& fabric) {
-  return {{"quantity", "microcylinder"}, {"fabric", fabric}, {"wi", {.48, .36, .8}}, {"wo", {-.6, 0, .8}}};
+  return {{"quantity", "microcylinder"},
+          {"fabric", fabric},
+          {"wi", {.48, .36, .8}},
+          {"wo", {-.6, 0, .8}}};
 }
 
 TEST(EvalMicrocylinder, AnObjectSaysTheSameAsItsConfig) {
@@ -78,8 +90,9 @@ TEST(EvalMicrocylinder, AnObjectSaysTheSameAsItsConfig) {
   Json without = linen();
   without.erase("model");
   EXPECT_EQ(value_of(request_for(without)), value_of(request_for("linen-plain")));
-  for (const auto& [key, value] :
-       {std::pair<const char*, Json>{"gaussian_width", "iw"}, {"fresnel_angle", "normal"}, {"blend_width_deg", 15.5}}) {
+  for (const auto& [key, value] : {std::pair<const char*, Json>{"gaussian_width", "iw"},
+                                   {"fresnel_angle", "normal"},
+                                   {"blend_width_deg", 15.5}}) {
     Json other = linen();
     other[key] = value;
     EXPECT_NE(value_of(request_for(other)), value_of(request_for("linen-plain"))) << key;
@@ -120,16 +133,19 @@ TEST(EvalMicrocylinder, BelowTheHorizonIsBlack) {
 
 TEST(EvalMicrocylinderFormat, ErrorsNameTheField) {
   const std::string unknown = error_of(request_for("denim"));
-  for (const char* known : {"denim", "linen-plain", "polyester-charmeuse-back", "polyester-charmeuse-front",
-                            "silk-crepe-de-chine", "silk-shot", "velvet"}) {
+  for (const char* known :
+       {"denim", "linen-plain", "polyester-charmeuse-back", "polyester-charmeuse-front",
+        "silk-crepe-de-chine", "silk-shot", "velvet"}) {
     EXPECT_NE(unknown.find(known), std::string::npos) << unknown;
   }
   Json fabric = linen();
   fabric["thread"][1]["kd"] = 2;
-  EXPECT_NE(error_of(request_for(fabric)).find("kd"), std::string::npos) << error_of(request_for(fabric));
+  EXPECT_NE(error_of(request_for(fabric)).find("kd"), std::string::npos)
+      << error_of(request_for(fabric));
   fabric = linen();
   fabric["thread"][0]["colour"] = "red";
-  EXPECT_NE(error_of(request_for(fabric)).find("colour"), std::string::npos) << error_of(request_for(fabric));
+  EXPECT_NE(error_of(request_for(fabric)).find("colour"), std::string::npos)
+      << error_of(request_for(fabric));
   fabric = linen();
   fabric["model"] = "velour";
   EXPECT_NE(error_of(request_for(fabric)).find("model"), std::string::npos);

@@ -80,14 +80,16 @@ TEST(EvalFormat, AnswersKeepTheOrderAndBlankLinesAreSkipped) {
 }
 
 TEST(EvalFormat, TheIdIsEchoedAsItWasWritten) {
-  for (const std::string id : {"1", "1.0", "1e2", "-0", "123456789012345678901234567890", "\"a\\u00e9\\/b\"",
-                               "null", "true", "[1, {\"b\":2, \"a\": \"},]\"}]", "{ \"x\" : [ ] }"}) {
+  for (const std::string id :
+       {"1", "1.0", "1e2", "-0", "123456789012345678901234567890", "\"a\\u00e9\\/b\"", "null",
+        "true", "[1, {\"b\":2, \"a\": \"},]\"}]", "{ \"x\" : [ ] }"}) {
     EXPECT_EQ(run("{\"quantity\":\"sg_mass\", \"id\" : " + id + " ,\"sharpness\":0}").lines.at(0),
               "{\"id\":" + id + ",\"value\":12.566370614359172}");
     EXPECT_EQ(run("{\"quantity\":\"sg_mass\",\"id\":" + id + "}").lines.at(0),
               "{\"id\":" + id + ",\"error\":\"missing field \\\"sharpness\\\"\"}");
   }
-  EXPECT_EQ(run("{\"quantity\":\"sg_mass\",\"sharpness\":0}").lines.at(0), "{\"value\":12.566370614359172}");
+  EXPECT_EQ(run("{\"quantity\":\"sg_mass\",\"sharpness\":0}").lines.at(0),
+            "{\"value\":12.566370614359172}");
 }
 
 TEST(EvalFormat, AnUnreadableLineHasIdNullAndDoesNotStopTheStream) {
@@ -122,8 +124,8 @@ TEST(EvalFormat, AnUnreadableLineHasIdNullAndDoesNotStopTheStream) {
 }
 
 TEST(EvalFormat, EveryTruncationOfALineIsAnAnsweredError) {
-  const std::string line =
-      "{\"id\":[7],\"quantity\":\"bcsdf\"," + kFiber + R"(,"wi":[0,1,0],"wo":[0,-1,0],"lobe":"tt"})";
+  const std::string line = "{\"id\":[7],\"quantity\":\"bcsdf\"," + kFiber +
+                           R"(,"wi":[0,1,0],"wo":[0,-1,0],"lobe":"tt"})";
   EXPECT_EQ(run(line).status, 0);
   for (std::size_t length = 1; length < line.size(); ++length) {
     const Json json = answer(line.substr(0, length));
@@ -133,7 +135,9 @@ TEST(EvalFormat, EveryTruncationOfALineIsAnAnsweredError) {
 
 TEST(EvalFormat, LinesTooLongOrTooDeepAreAnsweredAndTheStreamGoesOn) {
   const std::string good = R"({"quantity":"sg_mass","sharpness":0})";
-  const auto brackets = [](std::size_t depth) { return std::string(depth, '[') + std::string(depth, ']'); };
+  const auto brackets = [](std::size_t depth) {
+    return std::string(depth, '[') + std::string(depth, ']');
+  };
   const std::string start = R"({"quantity":"sg_mass","sharpness":0,"id":")";
   const std::string longest = start + std::string((256 << 10) - start.size() - 2, 'x') + "\"}";
   EXPECT_EQ(run(longest).status, 0) << "262,144 characters";
@@ -143,7 +147,8 @@ TEST(EvalFormat, LinesTooLongOrTooDeepAreAnsweredAndTheStreamGoesOn) {
       {std::string(longest.size() + 1, ' '), "longer than 262144 characters"},
       {std::string(3 << 20, '['), "longer than 262144 characters"},
       {start.substr(0, start.size() - 1) + brackets(64) + "}", "nested deeper than 64"},
-      {R"({"quantity":"microcylinder","wi":[0,0,1],"wo":[0,0,1],"fabric":{"a":)" + brackets(130'000) + "}}",
+      {R"({"quantity":"microcylinder","wi":[0,0,1],"wo":[0,0,1],"fabric":{"a":)" +
+           brackets(130'000) + "}}",
        "nested deeper than 64"},
       {R"({"quantity":)" + brackets(130'000) + "}", "nested deeper than 64"}};
   for (const auto& [line, error] : bad) {
@@ -226,14 +231,16 @@ TEST(EvalFormat, ErrorsNameTheField) {
   names(R"({"quantity":"sh","order":1,"direction":[0,0,1.002]})", "\"direction\"");
   names(R"({"quantity":"sh","order":1,"direction":[0,0]})", "\"direction\"");
   names(R"({"quantity":"sh","order":1,"direction":[0,0,"1"]})", "\"direction\"");
-  names(R"({"quantity":"sh_rotate","order":0,"rotation":[1,0,0,0,1,0,0,0,1.01],"coefficients":[1]})",
-        "\"rotation\"");
+  names(
+      R"({"quantity":"sh_rotate","order":0,"rotation":[1,0,0,0,1,0,0,0,1.01],"coefficients":[1]})",
+      "\"rotation\"");
   names(R"({"quantity":"sh_rotate","order":0,"rotation":[1,0,0,0,1,0,0,0,-1],"coefficients":[1]})",
         "\"rotation\"");
   names(R"({"quantity":"sh_rotate","order":1,"rotation":[1,0,0,0,1,0,0,0,1],"coefficients":[1]})",
         "\"coefficients\"");
   names("{\"quantity\":\"bcsdf_albedo\"," + kFiber + ",\"theta_i_deg\":90.1}", "\"theta_i_deg\"");
-  names("{\"quantity\":\"bcsdf\"," + kFiber + R"(,"wi":[0,1,0],"wo":[0,1,0],"lobe":"trt"})", "\"lobe\"");
+  names("{\"quantity\":\"bcsdf\"," + kFiber + R"(,"wi":[0,1,0],"wo":[0,1,0],"lobe":"trt"})",
+        "\"lobe\"");
   names("{\"quantity\":\"sg_scatter\"," + kFiber +
             R"(,"axis":[0,1,0],"sharpness":1,"wo":[0,1,0],"method":"fast"})",
         "\"method\"");
@@ -243,14 +250,17 @@ TEST(EvalFormat, ErrorsNameTheField) {
     return "{\"quantity\":\"bcsdf_albedo\",\"theta_i_deg\":0,\"fiber\":{" + fields + "}}";
   };
   const std::string colors = R"("color_r":[0,0,0],"color_tt":[1,1,1],)";
-  names(with_fiber(colors + R"("beta_r_deg":1,"beta_tt_deg":1)"), "missing field \"fiber.gamma_tt_deg\"");
-  names(with_fiber(colors + R"("beta_r_deg":0,"beta_tt_deg":1,"gamma_tt_deg":1)"), "\"fiber.beta_r_deg\"");
+  names(with_fiber(colors + R"("beta_r_deg":1,"beta_tt_deg":1)"),
+        "missing field \"fiber.gamma_tt_deg\"");
+  names(with_fiber(colors + R"("beta_r_deg":0,"beta_tt_deg":1,"gamma_tt_deg":1)"),
+        "\"fiber.beta_r_deg\"");
   names(with_fiber(colors + R"("beta_r_deg":1,"beta_tt_deg":1,"gamma_tt_deg":1,"x":0)"),
         "unknown field \"fiber.x\"");
   names(with_fiber(colors + R"("beta_r_deg":1,"beta_tt_deg":1,"gamma_tt_deg":1,"beta_r_deg":1)"),
         "\"fiber.beta_r_deg\"");
   names(
-      with_fiber(R"("color_r":[0,0,1.5],"color_tt":[1,1,1],"beta_r_deg":1,"beta_tt_deg":1,"gamma_tt_deg":1)"),
+      with_fiber(
+          R"("color_r":[0,0,1.5],"color_tt":[1,1,1],"beta_r_deg":1,"beta_tt_deg":1,"gamma_tt_deg":1)"),
       "\"fiber.color_r\"");
   names(R"({"quantity":"bcsdf_albedo","theta_i_deg":0,"fiber":3})", "\"fiber\"");
 }
@@ -262,23 +272,26 @@ TEST(EvalFormat, ADuplicateFieldKeepsTheId) {
 TEST(EvalAgreement, NumbersReadBackExactly) {
   const Vec3d wi(0.6, 0.8, 0.0);
   const Vec3d wo(-0.6, 0.0, 0.8);
-  expect_color(value_of("{\"quantity\":\"bcsdf\"," + kFiber + R"(,"wi":[0.6,0.8,0],"wo":[-0.6,0,0.8]})"),
-               evaluate_bcsdf(fiber(), wi, wo));
   expect_color(
-      value_of("{\"quantity\":\"bcsdf\"," + kFiber + R"(,"wi":[0.6,0.8,0],"wo":[-0.6,0,0.8],"lobe":"r"})"),
-      evaluate_bcsdf(fiber(), wi, wo, Lobe::kR));
+      value_of("{\"quantity\":\"bcsdf\"," + kFiber + R"(,"wi":[0.6,0.8,0],"wo":[-0.6,0,0.8]})"),
+      evaluate_bcsdf(fiber(), wi, wo));
+  expect_color(value_of("{\"quantity\":\"bcsdf\"," + kFiber +
+                        R"(,"wi":[0.6,0.8,0],"wo":[-0.6,0,0.8],"lobe":"r"})"),
+               evaluate_bcsdf(fiber(), wi, wo, Lobe::kR));
   expect_color(value_of("{\"quantity\":\"bcsdf_albedo\"," + kFiber + R"(,"theta_i_deg":-30})"),
                bcsdf_albedo(fiber(), radians(-30.0)));
   const std::pair<const char*, SgMethod> methods[] = {{"printed", SgMethod::kPrinted},
                                                       {"default", SgMethod::kDefault},
                                                       {"quadrature", SgMethod::kQuadrature}};
   for (const auto& [name, method] : methods) {
-    expect_color(value_of("{\"quantity\":\"sg_scatter\"," + kFiber +
-                          R"(,"axis":[0.6,0.8,0],"sharpness":150,"wo":[-0.6,0,0.8],"lobe":"tt","method":")" +
-                          name + "\"}"),
-                 sg_scatter(fiber(), {wi, 150.0}, wo, method, Lobe::kTt));
+    expect_color(
+        value_of("{\"quantity\":\"sg_scatter\"," + kFiber +
+                 R"(,"axis":[0.6,0.8,0],"sharpness":150,"wo":[-0.6,0,0.8],"lobe":"tt","method":")" +
+                 name + "\"}"),
+        sg_scatter(fiber(), {wi, 150.0}, wo, method, Lobe::kTt));
   }
-  const Json rows = value_of("{\"quantity\":\"bcsdf_sh\"," + kFiber + R"(,"theta_o_deg":20,"order":3})");
+  const Json rows =
+      value_of("{\"quantity\":\"bcsdf_sh\"," + kFiber + R"(,"theta_o_deg":20,"order":3})");
   const std::vector<Rgbd> exact = bcsdf_sh(fiber(), radians(20.0), 3);
   ASSERT_EQ(rows.size(), 16U);
   for (std::size_t j = 0; j < 16; ++j) expect_color(rows[j], exact[j]);
@@ -318,35 +331,43 @@ TEST(EvalStability, ValuesAreFiniteAtTheEndsOfTheRanges) {
         std::string(R"("fiber":{"color_r":[0,1,0.5],"color_tt":[1,0,0.5],"beta_r_deg":)") + beta +
         ",\"beta_tt_deg\":" + beta + ",\"gamma_tt_deg\":" + (beta[0] == '0' ? "0.01" : "360") + "}";
     EXPECT_EQ(run("{\"quantity\":\"bcsdf\"," + ends + R"(,"wi":[1,0,0],"wo":[-1,0,0]})").status, 0);
-    EXPECT_EQ(run("{\"quantity\":\"bcsdf_sh\"," + ends + R"(,"theta_o_deg":90,"order":10})").status, 0);
+    EXPECT_EQ(run("{\"quantity\":\"bcsdf_sh\"," + ends + R"(,"theta_o_deg":90,"order":10})").status,
+              0);
     for (const char* sharpness : {"0", "1e-300", "1e8", "1e15"}) {
       for (const char* method : {"printed", "default", "quadrature"}) {
-        EXPECT_EQ(
-            run("{\"quantity\":\"sg_scatter\"," + ends + R"(,"axis":[0,1,0],"wo":[0,-1,0],"sharpness":)" +
-                sharpness + ",\"method\":\"" + method + "\"}")
-                .status,
-            0)
+        EXPECT_EQ(run("{\"quantity\":\"sg_scatter\"," + ends +
+                      R"(,"axis":[0,1,0],"wo":[0,-1,0],"sharpness":)" + sharpness +
+                      ",\"method\":\"" + method + "\"}")
+                      .status,
+                  0)
             << beta << " " << sharpness << " " << method;
       }
       EXPECT_EQ(
-          run(std::string(R"({"quantity":"sg_zonal","order":10,"sharpness":)") + sharpness + "}").status, 0);
-      EXPECT_EQ(run(std::string(R"({"quantity":"sg_mass","sharpness":)") + sharpness + "}").status, 0);
+          run(std::string(R"({"quantity":"sg_zonal","order":10,"sharpness":)") + sharpness + "}")
+              .status,
+          0);
+      EXPECT_EQ(run(std::string(R"({"quantity":"sg_mass","sharpness":)") + sharpness + "}").status,
+                0);
     }
   }
 }
 
 TEST(EvalFormat, EveryDamagedLineHasOneAnswerPerLine) {
-  const std::string line = R"({"id":[7,{"a":"b\n"}],"quantity":"sh","order":1,"direction":[0,0.6,-0.8]})";
-  for_each_mutation(line, 1, std::string_view("\0\"\\[]{},:e-9 \xff", 14), [&](const std::string& damaged) {
-    if (damaged.find_first_not_of(" \t\r\n") == std::string::npos) return;
-    const Outcome result = run(damaged + "\n");
-    const auto lines = 1 + std::count(damaged.begin(), damaged.end(), '\n');
-    ASSERT_EQ(result.lines.size(), static_cast<std::size_t>(lines)) << damaged;
-    for (const std::string& text : result.lines) {
-      const Json json = Json::parse(text, nullptr, false);
-      ASSERT_TRUE(json.is_object() && json.contains("value") != json.contains("error")) << damaged << "\n" << text;
-    }
-  });
+  const std::string line =
+      R"({"id":[7,{"a":"b\n"}],"quantity":"sh","order":1,"direction":[0,0.6,-0.8]})";
+  for_each_mutation(
+      line, 1, std::string_view("\0\"\\[]{},:e-9 \xff", 14), [&](const std::string& damaged) {
+        if (damaged.find_first_not_of(" \t\r\n") == std::string::npos) return;
+        const Outcome result = run(damaged + "\n");
+        const auto lines = 1 + std::count(damaged.begin(), damaged.end(), '\n');
+        ASSERT_EQ(result.lines.size(), static_cast<std::size_t>(lines)) << damaged;
+        for (const std::string& text : result.lines) {
+          const Json json = Json::parse(text, nullptr, false);
+          ASSERT_TRUE(json.is_object() && json.contains("value") != json.contains("error"))
+              << damaged << "\n"
+              << text;
+        }
+      });
 }
 
 }  // namespace

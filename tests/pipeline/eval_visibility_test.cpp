@@ -21,8 +21,9 @@ Json value_of(const Json& request) {
 }
 
 Json request_of(const std::vector<std::string>& map) {
-  return {
-      {"quantity", "visibility"}, {"map", map}, {"directions", {{0, 0, 1}, {0, 0.6, 0.8}, {1, 0, 0}, {0, -0.8, -0.6}}}};
+  return {{"quantity", "visibility"},
+          {"map", map},
+          {"directions", {{0, 0, 1}, {0, 0.6, 0.8}, {1, 0, 0}, {0, -0.8, -0.6}}}};
 }
 
 std::vector<std::string> upper_half(std::size_t n) {
@@ -42,11 +43,13 @@ TEST(EvalVisibility, HalfSpace) {
     const double distance = std::asin(kHeights[i]);
     // (1, 0, 0) lies on the edge itself: distance 0 on either side.
     EXPECT_NEAR(value["ssdf"][i].get<double>(), distance, 1e-12);
-    EXPECT_NEAR(value["ssdf_integral"][i].get<double>(), 0.5 * (1 + std::erf(std::sqrt(sharpness / 2) * distance)),
-                1e-12);
+    EXPECT_NEAR(value["ssdf_integral"][i].get<double>(),
+                0.5 * (1 + std::erf(std::sqrt(sharpness / 2) * distance)), 1e-12);
   }
-  // Integral over z > 0 of the normalised Gaussian about +z: (1 - e^-s) / (1 - e^-2s); about the horizon: one half.
-  EXPECT_NEAR(value["quadrature"][0].get<double>(), std::expm1(-sharpness) / std::expm1(-2 * sharpness), 1e-9);
+  // Integral over z > 0 of the normalised Gaussian about +z: (1 - e^-s) / (1 - e^-2s); about the
+  // horizon: one half.
+  EXPECT_NEAR(value["quadrature"][0].get<double>(),
+              std::expm1(-sharpness) / std::expm1(-2 * sharpness), 1e-9);
   EXPECT_NEAR(value["quadrature"][2].get<double>(), 0.5, 1e-9);
 }
 
@@ -111,7 +114,8 @@ TEST(EvalVisibility, AxesCountAndSharpnessAreWhatIsAskedFor) {
   const Json value = value_of(request);
   const double weight = LatLongGrid(static_cast<int>(n)).solid_angle(0);
   for (std::size_t i = 0; i < kHeights.size(); ++i) {
-    EXPECT_NEAR(value["sg_sum"][i].get<double>(), weight * std::exp(128 * (kHeights[i] - 1)) / sg_mass(128.0), 1e-15);
+    EXPECT_NEAR(value["sg_sum"][i].get<double>(),
+                weight * std::exp(128 * (kHeights[i] - 1)) / sg_mass(128.0), 1e-15);
   }
 }
 
@@ -131,7 +135,8 @@ TEST(EvalVisibility, UpperAxesIgnoreWhatIsBelow) {
   }
   Json sphere = request_of(whole);
   sphere["axes"] = "sphere";
-  EXPECT_EQ(value_of(request_of(whole)), value_of(sphere)) << "the default where cells below are open";
+  EXPECT_EQ(value_of(request_of(whole)), value_of(sphere))
+      << "the default where cells below are open";
 }
 
 TEST(EvalVisibilityFormat, ErrorsNameTheField) {
@@ -171,7 +176,9 @@ TEST(EvalVisibilityFormat, ErrorsNameTheField) {
 
 // Work and memory grow with cells times Gaussians and cells times directions.
 TEST(EvalVisibility, RequestsThatCostTooMuchAreRefused) {
-  const auto error = [](const Json& request) { return answer(request).value("error", std::string()); };
+  const auto error = [](const Json& request) {
+    return answer(request).value("error", std::string());
+  };
   EXPECT_EQ(error(request_of(upper_half(257))), "field \"map\": expected 1 to 256 strings");
   Json request = request_of(upper_half(128));
   request["count"] = 1025;

@@ -22,8 +22,10 @@ std::string error_of(const Json& request) {
   return answer(request).value("error", "");
 }
 
-// A disc of radius 1/2 in a square window of side 2; half = (1, 0) takes its centre to the right edge, (1, 1) to the corner.
-const Json kDisc = {{"size", {2, 2}}, {"alpha", 0.5}, {"eccentricity", 0}, {"phi_deg", 30}, {"k", {1, 1}}};
+// A disc of radius 1/2 in a square window of side 2; half = (1, 0) takes its centre to the right
+// edge, (1, 1) to the corner.
+const Json kDisc = {
+    {"size", {2, 2}}, {"alpha", 0.5}, {"eccentricity", 0}, {"phi_deg", 30}, {"k", {1, 1}}};
 
 Json area_request(double hx, double hy) {
   return {{"quantity", "woven_area"}, {"segment", kDisc}, {"half", {hx, hy}}};
@@ -50,7 +52,8 @@ TEST(EvalWoven, BtfInAndBesideTheHighlight) {
   EXPECT_NEAR(value_of(request), 0.1 + 2 * 0.04, 1e-15);
   request["point"] = {1.51, 1};
   EXPECT_NEAR(value_of(request), 0.1, 1e-15);
-  // Mirror pair at 60 degrees: h = n, cos(theta_d) = 1/2, G = min(1, 2 * 1/2 / 1/2) = 1, cosines 1/2 each.
+  // Mirror pair at 60 degrees: h = n, cos(theta_d) = 1/2, G = min(1, 2 * 1/2 / 1/2) = 1, cosines
+  // 1/2 each.
   request["point"] = {1, 1};
   request["wi"] = {std::sqrt(0.75), 0, 0.5};
   request["wo"] = {-std::sqrt(0.75), 0, 0.5};
@@ -71,8 +74,10 @@ TEST(EvalWoven, BrdfWeighsSegmentsByArea) {
 }
 
 TEST(EvalWoven, YarnsFarIsTheMeanOfNear) {
-  Json request = {
-      {"quantity", "woven_yarns"}, {"fabric", "irawan-polyester"}, {"wi", {0, 0.6, 0.8}}, {"wo", {0, -0.48, 0.8773}}};
+  Json request = {{"quantity", "woven_yarns"},
+                  {"fabric", "irawan-polyester"},
+                  {"wi", {0, 0.6, 0.8}},
+                  {"wo", {0, -0.48, 0.8773}}};
   const Json far = answer(request)["value"];
   double sum = 0;
   constexpr int kGrid = 60;
@@ -87,7 +92,8 @@ TEST(EvalWoven, YarnsFarIsTheMeanOfNear) {
 }
 
 TEST(EvalWoven, ErrorsNameTheField) {
-  EXPECT_NE(error_of({{"quantity", "woven_area"}, {"segment", kDisc}}).find("\"half\""), std::string::npos);
+  EXPECT_NE(error_of({{"quantity", "woven_area"}, {"segment", kDisc}}).find("\"half\""),
+            std::string::npos);
   Json request = area_request(0, 0);
   request["segment"]["size"] = {0, 1};
   EXPECT_NE(error_of(request).find("\"segment.size\""), std::string::npos);
@@ -109,9 +115,11 @@ TEST(EvalWoven, ErrorsNameTheField) {
   request["point"] = {0, 0};
   request["ior"] = 0.5;
   EXPECT_NE(error_of(request).find("\"ior\""), std::string::npos);
-  EXPECT_NE(error_of({{"quantity", "woven_yarns"}, {"fabric", "tweed"}, {"wi", {0, 0, 1}}, {"wo", {0, 0, 1}}})
-                .find("irawan-denim"),
-            std::string::npos);
+  EXPECT_NE(
+      error_of(
+          {{"quantity", "woven_yarns"}, {"fabric", "tweed"}, {"wi", {0, 0, 1}}, {"wo", {0, 0, 1}}})
+          .find("irawan-denim"),
+      std::string::npos);
 }
 
 }  // namespace

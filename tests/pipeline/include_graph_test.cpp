@@ -59,7 +59,8 @@ std::vector<std::string> source_files() {
     if (!fs::exists(kRoot / folder)) continue;
     for (const auto& entry : fs::recursive_directory_iterator(kRoot / folder)) {
       const std::string extension = entry.path().extension().string();
-      if (extension == ".h" || extension == ".cpp") files.push_back(fs::relative(entry.path(), kRoot).string());
+      if (extension == ".h" || extension == ".cpp")
+        files.push_back(fs::relative(entry.path(), kRoot).string());
     }
   }
   std::sort(files.begin(), files.end());
@@ -74,7 +75,8 @@ std::string text_of(const std::string& file) {
 }
 
 std::vector<Include> includes_of(const std::string& file, const std::string& text) {
-  static const std::regex pattern(R"(^[ \t]*#[ \t]*include[ \t]*([<"])([^>"]+)[>"])", std::regex::multiline);
+  static const std::regex pattern(R"(^[ \t]*#[ \t]*include[ \t]*([<"])([^>"]+)[>"])",
+                                  std::regex::multiline);
   std::vector<Include> includes;
   for (std::sregex_iterator match(text.begin(), text.end(), pattern), end; match != end; ++match) {
     includes.push_back({file, (*match)[2], (*match)[1] == "\""});
@@ -94,7 +96,8 @@ std::string broken_arrow(const Include& include) {
 
 std::string broken_confinement(const Include& include) {
   for (const auto& [header, files] : kConfined) {
-    if (std::regex_match(include.target, std::regex(header)) && !std::regex_match(include.file, std::regex(files))) {
+    if (std::regex_match(include.target, std::regex(header)) &&
+        !std::regex_match(include.file, std::regex(files))) {
       return include.file + " must not include " + include.target + " (allowed in " + files + ")";
     }
   }
@@ -112,13 +115,15 @@ TEST(IncludeGraph, ArrowsGoOneWay) {
   const std::vector<std::string> files = source_files();
   ASSERT_GT(files.size(), 20U);
   for (const std::string& file : files) {
-    for (const Include& include : includes_of(file, text_of(file))) EXPECT_EQ(broken_arrow(include), "");
+    for (const Include& include : includes_of(file, text_of(file)))
+      EXPECT_EQ(broken_arrow(include), "");
   }
 }
 
 TEST(IncludeGraph, ThirdPartyHeadersStayInFewFiles) {
   for (const std::string& file : source_files()) {
-    for (const Include& include : includes_of(file, text_of(file))) EXPECT_EQ(broken_confinement(include), "");
+    for (const Include& include : includes_of(file, text_of(file)))
+      EXPECT_EQ(broken_confinement(include), "");
   }
 }
 
@@ -132,7 +137,8 @@ TEST(IncludeGraph, GuardsMatchPaths) {
 }
 
 TEST(IncludeGraph, WouldSeeAWrongInclude) {
-  const auto parsed = includes_of("formats/x.cpp", "#include <map>\n  #  include \"fibers/math/vector.h\"\n");
+  const auto parsed =
+      includes_of("formats/x.cpp", "#include <map>\n  #  include \"fibers/math/vector.h\"\n");
   ASSERT_EQ(parsed.size(), 2U);
   EXPECT_EQ(broken_arrow(parsed[0]), "");
   EXPECT_NE(broken_arrow(parsed[1]), "");

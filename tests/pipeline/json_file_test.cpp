@@ -25,7 +25,8 @@ TEST_F(JsonFileFormat, NestedDeeperThanTheLimitIsRefusedByName) {
   for (const int depth : {kMaxJsonDepth + 1, 70'000, 1'000'000}) {
     const auto path = put("deep.json", nested(depth));
     for (const std::string& error :
-         {error_of([&] { read_json(path); }), error_of([&] { read_accuracy(path); }), error_of([&] { read_warnings(path); })}) {
+         {error_of([&] { read_json(path); }), error_of([&] { read_accuracy(path); }),
+          error_of([&] { read_warnings(path); })}) {
       EXPECT_EQ(error, path.string() + ": JSON nested deeper than 64");
     }
   }
@@ -40,12 +41,18 @@ TEST_F(JsonFileFormat, WhatIsNoJsonIsRefusedByName) {
 
 TEST_F(JsonFileFormat, WarningsOfAPicturesReportAreReadBack) {
   EXPECT_TRUE(read_warnings(put("r.json", "{}")).empty());
-  const auto path = put("r.json", R"({"warnings":[{"subject":"s","what":"w","expected_relative_error":0.5,"instead":"i"}]})");
+  const auto path = put(
+      "r.json",
+      R"({"warnings":[{"subject":"s","what":"w","expected_relative_error":0.5,"instead":"i"}]})");
   ASSERT_EQ(read_warnings(path).size(), 1U);
   EXPECT_EQ(read_warnings(path)[0].what, "w");
-  for (const char* text : {"[]", "3", R"({"warnings":3})", R"({"warnings":[3]})", R"({"warnings":[{"subject":"s"}]})",
-                           R"({"warnings":[{"subject":1,"what":"w","expected_relative_error":0.5,"instead":"i"}]})"}) {
-    EXPECT_EQ(error_of([&] { read_warnings(put("r.json", text)); }).find((folder_ / "r.json").string() + ": no picture's report"), 0U)
+  for (const char* text :
+       {"[]", "3", R"({"warnings":3})", R"({"warnings":[3]})", R"({"warnings":[{"subject":"s"}]})",
+        R"({"warnings":[{"subject":1,"what":"w","expected_relative_error":0.5,"instead":"i"}]})"}) {
+    EXPECT_EQ(error_of([&] {
+                read_warnings(put("r.json", text));
+              }).find((folder_ / "r.json").string() + ": no picture's report"),
+              0U)
         << text;
   }
 }

@@ -1,4 +1,5 @@
-// What the machine cannot hold and what cannot be written is refused before the work, with numbers and names.
+// What the machine cannot hold and what cannot be written is refused before the work, with numbers
+// and names.
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>
@@ -19,7 +20,9 @@ class LimitsEndToEnd : public testing::Test {
     write("fabric.toml", kSmallFabric);
     write("scene.toml", kSmallScene);
   }
-  void write(const std::string& name, const std::string& text) const { std::ofstream(folder_.path() / name) << text; }
+  void write(const std::string& name, const std::string& text) const {
+    std::ofstream(folder_.path() / name) << text;
+  }
   static std::string edited(std::string text, const std::string& from, const std::string& to) {
     const std::size_t at = text.find(from);
     EXPECT_NE(at, std::string::npos) << from;
@@ -27,12 +30,14 @@ class LimitsEndToEnd : public testing::Test {
   }
   /// With at most 4 GB of address space, as by `ulimit -v`.
   ProgramResult run(const std::vector<std::string>& arguments) const {
-    return Program(folder_.path(), arguments, "",
-                   [&] {
-                     const rlimit limit = {std::uint64_t{4} << 30, std::uint64_t{4} << 30};
-                     if (::chdir(folder_.path().c_str()) != 0 || ::setrlimit(RLIMIT_AS, &limit) != 0) ::_exit(125);
-                     ::setenv("HEDDLE_CACHE", "cache", 1);
-                   })
+    return Program(
+               folder_.path(), arguments, "",
+               [&] {
+                 const rlimit limit = {std::uint64_t{4} << 30, std::uint64_t{4} << 30};
+                 if (::chdir(folder_.path().c_str()) != 0 || ::setrlimit(RLIMIT_AS, &limit) != 0)
+                   ::_exit(125);
+                 ::setenv("HEDDLE_CACHE", "cache", 1);
+               })
         .wait();
   }
   bool built_anything() const { return fs::exists(folder_.path() / "cache"); }
@@ -45,7 +50,8 @@ TEST_F(LimitsEndToEnd, APictureThatDoesNotFitIsRefusedWithNumbersAndTheOldOneSta
   write("picture.exr", "an old picture");
   const ProgramResult result = run({"render", "large.toml", "-o", "picture.exr"});
   EXPECT_EQ(result.status, 1);
-  EXPECT_NE(result.error.find("render: 16384 x 16384 pixels: needs 6"), std::string::npos) << result.error;
+  EXPECT_NE(result.error.find("render: 16384 x 16384 pixels: needs 6"), std::string::npos)
+      << result.error;
   EXPECT_NE(result.error.find("GB of memory"), std::string::npos) << result.error;
   EXPECT_NE(result.error.find("are available"), std::string::npos) << result.error;
   EXPECT_EQ(text_of(folder_.path() / "picture.exr"), "an old picture");
@@ -53,7 +59,8 @@ TEST_F(LimitsEndToEnd, APictureThatDoesNotFitIsRefusedWithNumbersAndTheOldOneSta
 }
 
 TEST_F(LimitsEndToEnd, FibersThatDoNotFitAreRefusedWithNumbers) {
-  const std::string many = edited(edited(kSmallFabric, "repeats_x = 1", "repeats_x = 64"), "repeats_y = 1", "repeats_y = 64");
+  const std::string many = edited(edited(kSmallFabric, "repeats_x = 1", "repeats_x = 64"),
+                                  "repeats_y = 1", "repeats_y = 64");
   write("many.toml", edited(many, "fibers_per_ply = 24", "fibers_per_ply = 2000"));
   const ProgramResult result = run({"synth", "many.toml"});
   EXPECT_EQ(result.status, 1);

@@ -33,8 +33,8 @@ TEST(PictureCompare, OneReference) {
 }
 
 TEST(PictureCompare, HalvesOfTheReferenceTakeItsNoiseAway) {
-  // The picture is the true mean; the halves err by the same amount in opposite directions in one pixel and in the
-  // same direction in none: (F - R0)(F - R1) = -1 and 0.
+  // The picture is the true mean; the halves err by the same amount in opposite directions in one
+  // pixel and in the same direction in none: (F - R0)(F - R1) = -1 and 0.
   Image reference = picture(4, 4);
   add_layer(reference, "half0.", 5, 4);
   add_layer(reference, "half1.", 3, 4);

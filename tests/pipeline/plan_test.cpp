@@ -22,7 +22,8 @@
 namespace heddle {
 namespace {
 
-Candidate candidate(const std::string& name, double bias, double noise, double build, double per_spp, int step = 1) {
+Candidate candidate(const std::string& name, double bias, double noise, double build,
+                    double per_spp, int step = 1) {
   return {.name = name,
           .bias_square = {bias * bias, 0},
           .noise_square = {noise * noise, 0},
@@ -32,13 +33,15 @@ Candidate candidate(const std::string& name, double bias, double noise, double b
           .spp_step = step};
 }
 
-const std::vector<Candidate> kCandidates = {candidate("path", 0, 4, 0, 0.05, 2), candidate("fast", 0.1, 1, 3, 0.01),
+const std::vector<Candidate> kCandidates = {candidate("path", 0, 4, 0, 0.05, 2),
+                                            candidate("fast", 0.1, 1, 3, 0.01),
                                             candidate("coarse", 0.3, 1, 0.5, 0.01)};
 
 TEST(Plan, SamplesMakeUpForWhatTheBiasLeaves) {
   const std::optional<Offer> made = offer(kCandidates[1], 0.2, 5);
   ASSERT_TRUE(made);
-  // The error as promised is within the tolerance, and with two thirds of the samples it would not be.
+  // The error as promised is within the tolerance, and with two thirds of the samples it would not
+  // be.
   EXPECT_LE(std::hypot(0.1, 1 / std::sqrt(made->spp)), 0.2);
   EXPECT_GT(std::hypot(0.1, 1 / std::sqrt(made->spp / 1.5)), 0.2);
   EXPECT_DOUBLE_EQ(made->expected_error, std::hypot(0.1, 1 / std::sqrt(made->spp)));
@@ -66,7 +69,8 @@ TEST(Plan, WhatIsNotKnownCostsSamples) {
 }
 
 TEST(Plan, MoreCautionWhereItCostsLittle) {
-  // A standard error has room enough beside a bias far below the tolerance, and would leave none beside one near it.
+  // A standard error has room enough beside a bias far below the tolerance, and would leave none
+  // beside one near it.
   const auto samples_more = [](double bias_square) {
     Candidate unsure = kCandidates[1];
     unsure.bias_square = {bias_square, 0};
@@ -74,7 +78,8 @@ TEST(Plan, MoreCautionWhereItCostsLittle) {
     unsure.bias_square.error = 0.5 * bias_square;
     return static_cast<double>(offer(unsure, 0.2, 1)->spp) / sure;
   };
-  EXPECT_GT(samples_more(0.1 * 0.04), 1 + 0.9 * 0.5 * 0.1 / (0.89 - 0.1)) << "a whole standard error, or nearly";
+  EXPECT_GT(samples_more(0.1 * 0.04), 1 + 0.9 * 0.5 * 0.1 / (0.89 - 0.1))
+      << "a whole standard error, or nearly";
   EXPECT_GT(samples_more(0.6 * 0.04), 1.1);
   Candidate near = kCandidates[1];
   near.bias_square = {0.77 * 0.04, 0.3 * 0.04};
@@ -109,9 +114,11 @@ TEST(Plan, PicturesGoOnUntilTheirOwnNoiseIsSmallEnough) {
     EXPECT_LE(std::sqrt(of.bias_square.value + noise.value / spp), tolerance) << of.name;
     EXPECT_GT(std::sqrt(of.bias_square.value + noise.value / (0.6 * spp)), tolerance) << of.name;
     EXPECT_EQ(more_samples(of, {0.1 * of.noise_square.value, 0}, spp, tolerance), 0);
-    EXPECT_GT(more_samples(of, {noise.value, 10 * noise.value}, spp, tolerance), 0) << "noise hardly known";
+    EXPECT_GT(more_samples(of, {noise.value, 10 * noise.value}, spp, tolerance), 0)
+        << "noise hardly known";
   }
-  EXPECT_EQ(more_samples(kCandidates[2], {100, 0}, 8, 0.2), 0) << "no number of samples helps against the bias";
+  EXPECT_EQ(more_samples(kCandidates[2], {100, 0}, 8, 0.2), 0)
+      << "no number of samples helps against the bias";
   EXPECT_EQ(more_samples(kCandidates[0], {1e9, 0}, kMostSamples, 0.2), 0);
 }
 
@@ -127,9 +134,9 @@ TEST(Plan, CheapestThatIsGoodEnough) {
 }
 
 TEST(Plan, WhatIsKnownIsPreferredToWhatCostsLittleLess) {
-  const std::vector<Candidate> list = {candidate("path", 0, 4, 0, 0.05, 2), candidate("known", 0.1, 1, 0, 0.011),
-                                       candidate("unknown", 0.1, 1, 0, 0.01),
-                                       candidate("far cheaper", 0.1, 1, 0, 0.003)};
+  const std::vector<Candidate> list = {
+      candidate("path", 0, 4, 0, 0.05, 2), candidate("known", 0.1, 1, 0, 0.011),
+      candidate("unknown", 0.1, 1, 0, 0.01), candidate("far cheaper", 0.1, 1, 0, 0.003)};
   const auto chosen = [&](std::size_t count, const std::vector<bool>& known) {
     return cheapest_known(std::span(list).first(count), known, 0.15, 1).value();
   };
@@ -141,14 +148,16 @@ TEST(Plan, WhatIsKnownIsPreferredToWhatCostsLittleLess) {
 }
 
 TEST(Plan, OfWhatCostsLittleMoreTheOneThatErrsLeast) {
-  const std::vector<Candidate> list = {candidate("cheap", 0.12, 1, 0, 0.01), candidate("better", 0.05, 1, 0, 0.0175),
+  const std::vector<Candidate> list = {candidate("cheap", 0.12, 1, 0, 0.01),
+                                       candidate("better", 0.05, 1, 0, 0.0175),
                                        candidate("best", 0, 1, 0, 0.05)};
   const double cheapest_seconds = offer(list[0], 0.2, 1)->seconds;
   ASSERT_GT(offer(list[1], 0.2, 1)->seconds, cheapest_seconds);
   ASSERT_GT(offer(list[2], 0.2, 1)->seconds, 1.5 * cheapest_seconds);
   EXPECT_EQ(cheapest_known(list, {true, true, true}, 0.2, 1), 1U);
   EXPECT_EQ(cheapest_known(list, {true, false, false}, 0.2, 1), 0U) << "what is known goes first";
-  std::vector<Candidate> alike = {candidate("changed", 0.1, 1, 0, 0.01), candidate("own", 0.1, 1, 0, 0.0105)};
+  std::vector<Candidate> alike = {candidate("changed", 0.1, 1, 0, 0.01),
+                                  candidate("own", 0.1, 1, 0, 0.0105)};
   alike[0].changes = 2;
   EXPECT_EQ(cheapest_known(alike, {true, true}, 0.2, 1), 1U);
   alike[1].seconds_per_spp = 0.02;
@@ -239,7 +248,8 @@ TEST(Probe, BlocksReachAllOfAPicture) {
   for (const int blocks : quadrants) EXPECT_NEAR(blocks, 64, 13);
 }
 
-/// Blocks of pixels whose eye rays bring noise that both pictures share, and each a noise of its own.
+/// Blocks of pixels whose eye rays bring noise that both pictures share, and each a noise of its
+/// own.
 struct Drawn {
   std::vector<FrameBuffers> reference;
   std::vector<FrameBuffers> picture;
@@ -302,13 +312,15 @@ TEST(ProbeStatistical, SmoothDifferencesAreFoundUnderMuchNoise) {
   }
   const Estimate square = squared_bias_of_means(brighter, drawn.reference);
   EXPECT_NEAR(square.value, 0.09, 4 * square.error);
-  // Of a block's half, of 64 pixels and 4 samples, in each of two pictures; and its product with the difference.
+  // Of a block's half, of 64 pixels and 4 samples, in each of two pictures; and its product with
+  // the difference.
   const double variance = 2 * 25.0 / (64 * 4);
   EXPECT_LT(square.error, 2 * std::sqrt((variance * variance + 2 * variance * 0.09) / 64));
   EXPECT_GT(squared_bias(brighter, drawn.reference).error, 5 * square.error);
 }
 
-/// A picture of 64 x 64 pixels with so many samples, whose noise doubles every 32 columns and of which a share of samples is bright.
+/// A picture of 64 x 64 pixels with so many samples, whose noise doubles every 32 columns and of
+/// which a share of samples is bright.
 FrameBuffers noisy(int samples, double share_of_bright, double bright, std::uint32_t seed) {
   std::mt19937 engine(seed);
   std::normal_distribution<double> normal;
@@ -322,8 +334,8 @@ FrameBuffers noisy(int samples, double share_of_bright, double bright, std::uint
     PixelSums sums;
     for (int s = 0; s < samples; ++s) {
       const double spread = k % 64 < 32 ? 1 : 2;
-      const auto value =
-          static_cast<float>(1 + spread * normal(engine) + (uniform(engine) < share_of_bright ? bright : 0));
+      const auto value = static_cast<float>(1 + spread * normal(engine) +
+                                            (uniform(engine) < share_of_bright ? bright : 0));
       sums.add({Rgb(value, value, value), Rgb::Zero(), Rgb::Zero(), 1}, s);
     }
     sums.store(samples, k, frame);
@@ -332,11 +344,13 @@ FrameBuffers noisy(int samples, double share_of_bright, double bright, std::uint
 }
 
 TEST(ProbeStatistical, APictureKnowsHowWellItKnowsItsNoise) {
-  // Known noise, half of the pixels with 1 and half with 4: no error but that of each pixel's 15 degrees of freedom.
+  // Known noise, half of the pixels with 1 and half with 4: no error but that of each pixel's 15
+  // degrees of freedom.
   const Estimate even = sample_variance_of_all(noisy(16, 0, 0, 3));
   EXPECT_NEAR(even.value, 2.5, 4 * even.error);
   EXPECT_NEAR(even.error, std::sqrt((1 + 16) / 2.0 * 2 / 15 / 4096), 0.1 * even.error);
-  // Every 3000th sample is brighter by 200: of the variance 13.3 of it, known from about 22 of them, to 1 / sqrt(22).
+  // Every 3000th sample is brighter by 200: of the variance 13.3 of it, known from about 22 of
+  // them, to 1 / sqrt(22).
   double within = 0;
   for (std::uint32_t seed = 0; seed < 40; ++seed) {
     const Estimate rare = sample_variance_of_all(noisy(16, 1 / 3000.0, 200, 100 + seed));
@@ -350,7 +364,8 @@ TEST(ProbeStatistical, APictureKnowsHowWellItKnowsItsNoise) {
 
 TEST(Plan, WhatIsSeenOfOneWayHoldsOfItsLike) {
   const Estimate like_thought{0.2, 0.1};
-  // Worse than thought: so is the other, by as much. Better: by the same factor, so that no square turns negative.
+  // Worse than thought: so is the other, by as much. Better: by the same factor, so that no square
+  // turns negative.
   EXPECT_NEAR(alike({0.3, 0.2}, like_thought, {0.5, 0.05}).value, 0.6, 1e-12);
   EXPECT_NEAR(alike({0.3, 0.2}, like_thought, {0.05, 0.02}).value, 0.075, 1e-12);
   EXPECT_EQ(alike({0.3, 0.2}, like_thought, {0, 0.02}).value, 0);
@@ -367,7 +382,9 @@ AccuracyTable small_table() {
   table.sharpness = {10, 1000};
   table.footprint_mm = {0.1, 0.4};
   table.light_cosine = {0.5, 0.9};
-  const auto entry = [](double bias) { return Accuracy{bias, 0.01, 2 * bias, 3 * bias, Rgbd(1, 0.9, 1.1)}; };
+  const auto entry = [](double bias) {
+    return Accuracy{bias, 0.01, 2 * bias, 3 * bias, Rgbd(1, 0.9, 1.1)};
+  };
   table.bent_footprint_mm = 3;
   table.bent_light_cosine = 0.7;
   table.bent_between = {0.2, 0.4};
@@ -375,12 +392,13 @@ AccuracyTable small_table() {
   table.color = Rgbd(1.5, 1, 0.5);
   table.through = 0.25;
   // [light][footprint][height]: low light errs by 10 more.
-  table.settings = {{"path", 1e-5, 0.5, std::vector<Accuracy>(8, entry(0)), {entry(0), entry(0)}},
-                    {"exact",
-                     1e-6,
-                     0.25,
-                     {entry(11), entry(1), entry(12), entry(2), entry(13), entry(3), entry(14), entry(4)},
-                     {entry(5), entry(7)}}};
+  table.settings = {
+      {"path", 1e-5, 0.5, std::vector<Accuracy>(8, entry(0)), {entry(0), entry(0)}},
+      {"exact",
+       1e-6,
+       0.25,
+       {entry(11), entry(1), entry(12), entry(2), entry(13), entry(3), entry(14), entry(4)},
+       {entry(5), entry(7)}}};
   table.costs = {{"maps", {1.5, 3.0}}, {"transfer, cells x 2", {2.5, 5.0}}};
   return table;
 }
@@ -390,8 +408,10 @@ TEST(AccuracyTable, BetweenEntriesInLogarithms) {
   EXPECT_DOUBLE_EQ(table.at("exact", 10, 0.1, 0.9).bias_square, 1);
   EXPECT_NEAR(table.at("exact", 10, 0.2, 0.9).bias_square, 1.5, 1e-12);
   EXPECT_NEAR(table.at("exact", 100, 0.2, 0.9).bias_square, 2.5, 1e-12);
-  EXPECT_NEAR(table.at("exact", 100, 0.2, 0.6).bias_square, 10, 1e-12) << "cosines themselves, not their logarithms";
-  EXPECT_DOUBLE_EQ(table.at("exact", 0, 0.001, 1).bias_square, 1) << "the nearest entry beyond the ends";
+  EXPECT_NEAR(table.at("exact", 100, 0.2, 0.6).bias_square, 10, 1e-12)
+      << "cosines themselves, not their logarithms";
+  EXPECT_DOUBLE_EQ(table.at("exact", 0, 0.001, 1).bias_square, 1)
+      << "the nearest entry beyond the ends";
   EXPECT_DOUBLE_EQ(table.at("exact", kDirectionalSharpness, 10, 0).bias_square, 14);
   EXPECT_NEAR(table.at("exact", 100, 0.2, 0.9).change_square, 7.5, 1e-12);
   EXPECT_NEAR(table.between_at(100), 0.3, 1e-12);
@@ -419,12 +439,13 @@ TEST(AccuracyTableFormat, DamagedTablesAreRefused) {
     std::ofstream(path, std::ios::trunc) << whole.substr(0, size);
     EXPECT_THROW(read_accuracy(path), FileError) << size;
   }
-  for (const auto& [from, to] : {std::pair<std::string, std::string>{"\"version\": 3", "\"version\": 99"},
-                                 {"heddle accuracy", "heddle chart"},
-                                 {"1000.0", "10.0"},
-                                 {"0.2,\n  0.4", "0.2"},
-                                 {"\"threads\": 2", "\"threads\": 2e300"},
-                                 {"\"threads\": 2", "\"threads\": \"2\""}}) {
+  for (const auto& [from, to] :
+       {std::pair<std::string, std::string>{"\"version\": 3", "\"version\": 99"},
+        {"heddle accuracy", "heddle chart"},
+        {"1000.0", "10.0"},
+        {"0.2,\n  0.4", "0.2"},
+        {"\"threads\": 2", "\"threads\": 2e300"},
+        {"\"threads\": 2", "\"threads\": \"2\""}}) {
     std::string damaged = whole;
     ASSERT_NE(damaged.find(from), std::string::npos) << from;
     std::ofstream(path, std::ios::trunc) << damaged.replace(damaged.find(from), from.size(), to);
@@ -440,12 +461,15 @@ TriangleMesh roof(float height, bool half) {
   for (int k = 0; k <= kCorners; ++k) {
     const float angle = (half ? kPif : 2 * kPif) * static_cast<float>(k) / kCorners - 0.5F * kPif;
     mesh.positions.emplace_back(2 * std::cos(angle), 2 * std::sin(angle), height);
-    if (k > 0) mesh.triangles.push_back({0, static_cast<std::uint32_t>(k), static_cast<std::uint32_t>(k + 1)});
+    if (k > 0)
+      mesh.triangles.push_back(
+          {0, static_cast<std::uint32_t>(k), static_cast<std::uint32_t>(k + 1)});
   }
   return mesh;
 }
 
-// A disk of radius r at height h over a place covers r^2 / (r^2 + h^2) of its cosine-weighted hemisphere.
+// A disk of radius r at height h over a place covers r^2 / (r^2 + h^2) of its cosine-weighted
+// hemisphere.
 TEST(EnclosureLaw, IsTheShareOfTheHemisphereThatIsCovered) {
   const auto tile = std::make_shared<TileScene>(crossed_layers(test_cotton()));
   const auto of = [&](std::vector<TriangleMesh> meshes, const Vec3& direction) {
@@ -463,7 +487,8 @@ TEST(EnclosureLaw, IsTheShareOfTheHemisphereThatIsCovered) {
   EXPECT_NEAR(of({roof(top + 1, false)}, down), 0.8, 0.05);
   EXPECT_NEAR(of({roof(top + 4, false)}, down), 0.2, 0.05);
   EXPECT_NEAR(of({roof(top + 1, true)}, down), 0.4, 0.09);
-  EXPECT_EQ(of({roof(top + 1, false)}, up), 0) << "what is behind the side that is seen does not matter";
+  EXPECT_EQ(of({roof(top + 1, false)}, up), 0)
+      << "what is behind the side that is seen does not matter";
 }
 
 /// The table of the small fabric, measured with little effort.
@@ -472,12 +497,14 @@ AccuracyTable measured_table() {
   std::ofstream(folder.path() / "fabric.toml") << kSmallFabric;
   std::ostringstream silent;
   Console console(silent, false, true);
-  StageContext context{.cache = Cache(folder.path() / "cache"), .console = &console, .seed = {}, .results = {}};
+  StageContext context{
+      .cache = Cache(folder.path() / "cache"), .console = &console, .seed = {}, .results = {}};
   FabricStages stages(folder.path() / "fabric.toml", context);
   AccuracyData data;
   data.pack = load_pack(stages.pack(kEverything).path);
-  return measure_accuracy(data, 1, [](double) {},
-                          {.pixels = 32, .bent_pixels = 8, .path_samples = 6, .method_samples = 2, .bent_factor = 4});
+  return measure_accuracy(
+      data, 1, [](double) {},
+      {.pixels = 32, .bent_pixels = 8, .path_samples = 6, .method_samples = 2, .bent_factor = 4});
 }
 
 TEST(MeasureAccuracyStatistical, SaysWhatHoldsOfAnyFabric) {
@@ -495,25 +522,31 @@ TEST(MeasureAccuracyStatistical, SaysWhatHoldsOfAnyFabric) {
   EXPECT_FALSE(table.has(order_setting(3))) << "the fabric's own order is 2";
   EXPECT_TRUE(table.has(order_setting(1)));
   for (const double sharpness : table.sharpness) {
-    const auto at = [&](const char* setting, double footprint) { return table.at(setting, sharpness, footprint, 0.8); };
+    const auto at = [&](const char* setting, double footprint) {
+      return table.at(setting, sharpness, footprint, 0.8);
+    };
     for (const double footprint : table.footprint_mm) {
       EXPECT_EQ(at("path", footprint).bias_square, 0);
-      EXPECT_GT(at("path", footprint).noise_square, at("exact", footprint).noise_square) << sharpness;
+      EXPECT_GT(at("path", footprint).noise_square, at("exact", footprint).noise_square)
+          << sharpness;
       // Six events are too dark, and differ from all of them by what is missing.
       EXPECT_LT(at("path-6", footprint).color_ratio.mean(), 1) << sharpness;
     }
     // A wider pixel sees more of the cloth's variety, and averages errors.
     EXPECT_GE(at("exact", 1).noise_square, at("exact", 0.02).noise_square);
-    EXPECT_LT(at("exact", 1).bias_square, at("exact", 0.02).bias_square + 3 * at("exact", 0.02).bias_square_error);
+    EXPECT_LT(at("exact", 1).bias_square,
+              at("exact", 0.02).bias_square + 3 * at("exact", 0.02).bias_square_error);
   }
-  // What a setting changes is part of what it errs by: the root of one is at most the other's and the base's together.
+  // What a setting changes is part of what it errs by: the root of one is at most the other's and
+  // the base's together.
   for (const double sharpness : table.sharpness) {
     EXPECT_EQ(table.at("exact", sharpness, 0.02, 0.8).change_square, 0);
     const Accuracy low = table.at(order_setting(1), sharpness, 0.3, 0.8);
     const Accuracy base = table.at("exact", sharpness, 0.3, 0.8);
     EXPECT_GT(low.change_square, 0) << sharpness;
-    EXPECT_LT(std::sqrt(low.change_square), std::sqrt(std::max(0.0, low.bias_square) + 2 * low.bias_square_error) +
-                                                std::sqrt(std::max(0.0, base.bias_square) + 2 * base.bias_square_error))
+    EXPECT_LT(std::sqrt(low.change_square),
+              std::sqrt(std::max(0.0, low.bias_square) + 2 * low.bias_square_error) +
+                  std::sqrt(std::max(0.0, base.bias_square) + 2 * base.bias_square_error))
         << sharpness;
     EXPECT_GT(table.between_at(sharpness), 0) << "folds light each other";
   }

@@ -35,9 +35,10 @@ struct ProgramResult {
 /// A started program; standard output and error go to files in `folder`.
 class Program {
  public:
-  /// `prepare` runs in the new process before the program does: limits, ignored signals, other standard streams.
-  Program(const std::filesystem::path& folder, std::vector<std::string> arguments, const std::string& input = "",
-          const std::function<void()>& prepare = {})
+  /// `prepare` runs in the new process before the program does: limits, ignored signals, other
+  /// standard streams.
+  Program(const std::filesystem::path& folder, std::vector<std::string> arguments,
+          const std::string& input = "", const std::function<void()>& prepare = {})
       : out_(folder / "stdout.txt"), error_(folder / "stderr.txt") {
     const std::filesystem::path in = folder / "stdin.txt";
     std::ofstream(in) << input;
@@ -73,14 +74,16 @@ class Program {
     }
   }
 
-  /// Has it come as far as to answer SIGTERM, which it then blocks in all threads but one? (Libraries that start threads block
-  /// all signals for a moment.)
+  /// Has it come as far as to answer SIGTERM, which it then blocks in all threads but one?
+  /// (Libraries that start threads block all signals for a moment.)
   bool answers_signals() const {
     std::ifstream status("/proc/" + std::to_string(pid_) + "/status");
     for (std::string name; status >> name;) {
       unsigned long blocked = 0;
       if (name != "SigBlk:" || !(status >> std::hex >> blocked)) continue;
-      const auto blocks = [blocked](int signal_number) { return (blocked >> (signal_number - 1) & 1) != 0; };
+      const auto blocks = [blocked](int signal_number) {
+        return (blocked >> (signal_number - 1) & 1) != 0;
+      };
       return blocks(SIGTERM) && !blocks(SIGHUP);
     }
     return false;
@@ -89,7 +92,8 @@ class Program {
   ProgramResult wait() {
     if (!ended_) ::waitpid(pid_, &wait_status_, 0);
     ended_ = true;
-    const int status = WIFEXITED(wait_status_) ? WEXITSTATUS(wait_status_) : -WTERMSIG(wait_status_);
+    const int status =
+        WIFEXITED(wait_status_) ? WEXITSTATUS(wait_status_) : -WTERMSIG(wait_status_);
     return {status, text_of(out_), text_of(error_)};
   }
 

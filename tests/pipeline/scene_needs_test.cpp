@@ -15,7 +15,9 @@ Light gaussian(float sharpness) {
 }
 
 TEST(SceneNeeds, FollowTheLights) {
-  const auto needs = [](std::vector<Light> lights) { return needs_of(RenderMethod::kExact, lights); };
+  const auto needs = [](std::vector<Light> lights) {
+    return needs_of(RenderMethod::kExact, lights);
+  };
   EXPECT_TRUE(needs({Light{}}).ssdf);
   EXPECT_FALSE(needs({Light{}}).sgs);
   EXPECT_FALSE(needs({gaussian(0)}).ssdf);
@@ -41,7 +43,8 @@ TEST(SceneNeeds, FollowTheMethod) {
     EXPECT_FALSE(needs.ssdf || needs.sgs || needs.transfer || needs.volume);
   }
   const std::vector<Light> soft = {gaussian(10)};
-  for (const RenderMethod rival : {RenderMethod::kPrt, RenderMethod::kTsaiShih16, RenderMethod::kTsaiShihFull}) {
+  for (const RenderMethod rival :
+       {RenderMethod::kPrt, RenderMethod::kTsaiShih16, RenderMethod::kTsaiShihFull}) {
     const Needs needs = needs_of(rival, soft);
     EXPECT_TRUE(needs.ssdf && needs.transfer);
     EXPECT_FALSE(needs.sgs);

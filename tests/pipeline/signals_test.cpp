@@ -1,5 +1,5 @@
-// SIGINT and SIGTERM: every command ends within a second, with its status, and says what is kept of its work; what it says
-// is true.
+// SIGINT and SIGTERM: every command ends within a second, with its status, and says what is kept of
+// its work; what it says is true.
 
 #include <gtest/gtest.h>
 
@@ -29,7 +29,8 @@ double seconds_since(Clock::time_point start) {
 }
 
 std::string edited(std::string text, const std::string& from, const std::string& to) {
-  for (std::size_t at = text.find(from); at != std::string::npos; at = text.find(from, at + to.size())) {
+  for (std::size_t at = text.find(from); at != std::string::npos;
+       at = text.find(from, at + to.size())) {
     text.replace(at, from.size(), to);
   }
   return text;
@@ -43,16 +44,19 @@ class Workshop {
     write("fabric.toml", small);
     write("scene.toml", kSmallScene);
     // Two million segments; twenty million; a chunk of transfer that takes hours.
-    write("many.toml",
-          edited(edited(edited(small, "repeats_x = 1", "repeats_x = 24"), "repeats_y = 1", "repeats_y = 24"),
-                 "fibers_per_ply = 12", "fibers_per_ply = 96"));
-    write("huge.toml", edited(text_of(*this / "many.toml"), "fibers_per_ply = 96", "fibers_per_ply = 960"));
+    write("many.toml", edited(edited(edited(small, "repeats_x = 1", "repeats_x = 24"),
+                                     "repeats_y = 1", "repeats_y = 24"),
+                              "fibers_per_ply = 12", "fibers_per_ply = 96"));
+    write("huge.toml",
+          edited(text_of(*this / "many.toml"), "fibers_per_ply = 96", "fibers_per_ply = 960"));
     write("slow.toml", edited(small, "_paths = 4096", "_paths = 100000000"));
     write("large.toml", edited(kSmallScene, "[24, 24]", "[2048, 2048]"));
     write("slow-scene.toml", edited(kSmallScene, "spp = 4", "spp = 10000000"));
   }
   fs::path operator/(const std::string& name) const { return folder_.path() / name; }
-  void write(const std::string& name, const std::string& text) const { std::ofstream(*this / name) << text; }
+  void write(const std::string& name, const std::string& text) const {
+    std::ofstream(*this / name) << text;
+  }
 
   /// Runs in the folder, so that relative names do.
   Program start(const Arguments& arguments, const std::function<void()>& prepare = {}) const {
@@ -107,7 +111,8 @@ Ending interrupt(Program& program, int signal_number, const std::function<bool()
   EXPECT_LE(ending.seconds, 1.0);
   const std::size_t at = result.error.find("heddle: interrupted; ");
   EXPECT_NE(at, std::string::npos) << result.error;
-  if (at != std::string::npos) ending.message = result.error.substr(at, result.error.find('\n', at) - at);
+  if (at != std::string::npos)
+    ending.message = result.error.substr(at, result.error.find('\n', at) - at);
   return ending;
 }
 
@@ -120,7 +125,8 @@ void leave_standard_input_open() {
 void make_large_files(const Workshop& shop) {
   const Json report = shop.report({"synth", "many.toml"});
   fs::create_directories(shop / "many.pack");
-  fs::copy_file(shop / report.at("artifacts").at(0).get<std::string>(), shop / "many.pack" / "fibers.safetensors");
+  fs::copy_file(shop / report.at("artifacts").at(0).get<std::string>(),
+                shop / "many.pack" / "fibers.safetensors");
   const Exemplar exemplar = read_exemplar(shop / "many.pack" / "fibers.safetensors");
   PackManifest manifest;
   manifest.name = "many";
@@ -131,8 +137,10 @@ void make_large_files(const Workshop& shop) {
 
   Image image;
   image.width = image.height = 4096;
-  const std::vector<float> grey(static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height), 0.5F);
-  for (const char* channel : {"R", "G", "B"}) image.channels[channel] = {ChannelType::kHalf, grey, {}};
+  const std::vector<float> grey(
+      static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height), 0.5F);
+  for (const char* channel : {"R", "G", "B"})
+    image.channels[channel] = {ChannelType::kHalf, grey, {}};
   write_exr(shop / "grey.exr", image);
 }
 
@@ -154,10 +162,12 @@ TEST(SignalsEndToEnd, EveryCommandEndsWithinASecondAndSaysWhatIsKept) {
       {{"precompute", "slow.toml"}, stages},
       {{"accuracy", "fabric.toml"}, "nothing of the measurement is kept"},
       {{"run", "slow-scene.toml"}, "nothing is kept of a picture"},
-      {{"render", "scene.toml", "-o", "exact.exr", "--spp", "1000000"}, "nothing of the picture is kept"},
+      {{"render", "scene.toml", "-o", "exact.exr", "--spp", "1000000"},
+       "nothing of the picture is kept"},
       {{"render", "scene.toml", "-o", "path.exr", "--method", "path", "--spp", "1000000"},
        "nothing of the picture is kept"},
-      {{"chart", "scene.toml", "-o", "chart", "--reference-spp", "1000000"}, "with --resume goes on from them"},
+      {{"chart", "scene.toml", "-o", "chart", "--reference-spp", "1000000"},
+       "with --resume goes on from them"},
       {{"plan", "large.toml", "--tolerance", "0.02"}, "nothing of the measurement is kept"},
       {{"eval"}, "the answers printed so far hold", leave_standard_input_open},
       {{"info", "many.toml"}, "nothing was written"},
@@ -166,7 +176,8 @@ TEST(SignalsEndToEnd, EveryCommandEndsWithinASecondAndSaysWhatIsKept) {
   };
   for (const Case& one : cases) {
     for (const auto& [signal_number, moment] : {std::pair{SIGINT, 0.3}, std::pair{SIGTERM, 0.0}}) {
-      SCOPED_TRACE(one.arguments.front() + " " + one.arguments.back() + " after " + std::to_string(moment) + " s");
+      SCOPED_TRACE(one.arguments.front() + " " + one.arguments.back() + " after " +
+                   std::to_string(moment) + " s");
       Program program = shop.start(one.arguments, one.prepare);
       const Ending ending = interrupt(program, signal_number, into(program, moment));
       EXPECT_NE(ending.message.find(one.kept), std::string::npos) << ending.message;
@@ -213,7 +224,8 @@ TEST(SignalsEndToEnd, StandardErrorThatNobodyReadsHoldsNothingUp) {
     ::fcntl(ends[1], F_SETFL, 0);
     if (::dup2(ends[1], STDERR_FILENO) < 0) ::_exit(124);
   };
-  for (const std::function<void()>& prepare : {std::function<void()>(closed_pipe), std::function<void()>(full_pipe)}) {
+  for (const std::function<void()>& prepare :
+       {std::function<void()>(closed_pipe), std::function<void()>(full_pipe)}) {
     Program program = shop.start({"eval"}, prepare);
     ASSERT_TRUE(program.signal_when(into(program, 0), SIGTERM));
     const Clock::time_point sent = Clock::now();
@@ -226,7 +238,8 @@ TEST(SignalsEndToEnd, StandardErrorThatNobodyReadsHoldsNothingUp) {
 std::vector<fs::path> files_in(const fs::path& folder, const std::string& extension) {
   std::vector<fs::path> files;
   std::error_code error;
-  for (fs::recursive_directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
+  for (fs::recursive_directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error)) {
     const bool is_hidden = entry->path().filename().string().starts_with(".");
     if (!is_hidden && entry->path().extension() == extension) files.push_back(entry->path());
   }
@@ -267,8 +280,10 @@ TEST(SignalsEndToEnd, RenderKeepsTheDataOfItsFabricsAndNothingOfThePicture) {
   const Workshop shop;
   Program program = shop.start({"render", "scene.toml", "-o", "out.exr", "--spp", "1000000"});
   interrupt(program, SIGINT, once_there_is(shop / "cache" / "pack", ".json"));
-  for (const char* extension : {".exr", ".png"}) EXPECT_EQ(files_in(shop / "", extension), std::vector<fs::path>{});
-  EXPECT_EQ(stages_built(shop.report({"render", "scene.toml", "-o", "out.exr"})), std::vector<std::string>{});
+  for (const char* extension : {".exr", ".png"})
+    EXPECT_EQ(files_in(shop / "", extension), std::vector<fs::path>{});
+  EXPECT_EQ(stages_built(shop.report({"render", "scene.toml", "-o", "out.exr"})),
+            std::vector<std::string>{});
   EXPECT_TRUE(fs::exists(shop / "out.exr"));
 }
 
@@ -284,15 +299,18 @@ TEST(SignalsEndToEnd, RunKeepsFinishedPictures) {
 
 TEST(SignalsEndToEnd, ChartGoesOnFromFinishedPictures) {
   const Workshop shop;
-  Arguments chart = {"chart", "scene.toml", "-o", "chart", "--quick", "--methods", "path", "--reference-spp", "200"};
+  Arguments chart = {"chart", "scene.toml",      "-o", "chart", "--quick", "--methods",
+                     "path",  "--reference-spp", "200"};
   Program program = shop.start(chart);
   interrupt(program, SIGINT, once_there_is(shop / "chart" / "runs", ".json"));
   std::map<fs::path, fs::file_time_type> kept;
-  for (const fs::path& record : files_in(shop / "chart" / "runs", ".json")) kept[record] = fs::last_write_time(record);
+  for (const fs::path& record : files_in(shop / "chart" / "runs", ".json"))
+    kept[record] = fs::last_write_time(record);
   EXPECT_EQ(kept.size(), 1U) << "the first reference alone";
   chart.emplace_back("--resume");
   shop.report(chart);
-  for (const auto& [record, time] : kept) EXPECT_EQ(fs::last_write_time(record), time) << "rendered again";
+  for (const auto& [record, time] : kept)
+    EXPECT_EQ(fs::last_write_time(record), time) << "rendered again";
   EXPECT_GT(files_in(shop / "chart" / "runs", ".json").size(), kept.size());
 }
 

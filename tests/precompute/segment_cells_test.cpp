@@ -71,7 +71,8 @@ TEST(SegmentCellsLaw, EverySegmentHasACellAndEveryCellASegment) {
   EXPECT_EQ(*used.rbegin(), cells.count - 1);
 }
 
-// What they are for: the same number of cells, and less of what an eye sees is far from its cell's mean.
+// What they are for: the same number of cells, and less of what an eye sees is far from its cell's
+// mean.
 TEST(SegmentCellsLaw, SpreadLessThanCubesOfTheSameNumber) {
   const Cloth cloth;
   const SegmentCells cells = make_segment_cells(cloth.exemplar, cloth.origins, kEdgeMm);

@@ -24,19 +24,23 @@ VisibilityMaps holes(std::size_t count, bool both_sides) {
   const LatLongGrid grid(kN);
   for (std::size_t s = 0; s + 1 < count; ++s) {
     RandomStream random(3, RandomStage::kTest, s, 0);
-    const double z = both_sides ? 1 - 2 * random.uniform_double() : 0.3 + 0.7 * random.uniform_double();
+    const double z =
+        both_sides ? 1 - 2 * random.uniform_double() : 0.3 + 0.7 * random.uniform_double();
     const double azimuth = 2 * kPi * random.uniform_double();
-    const Vec3d axis(std::sqrt(1 - z * z) * std::cos(azimuth), std::sqrt(1 - z * z) * std::sin(azimuth), z);
+    const Vec3d axis(std::sqrt(1 - z * z) * std::cos(azimuth),
+                     std::sqrt(1 - z * z) * std::sin(azimuth), z);
     for (int cell = 0; cell < (both_sides ? kN * kN : kN * kN / 2); ++cell) {
       if (axis.dot(grid.centre(cell / kN, cell % kN)) < std::cos(radians(35))) continue;
-      maps.words[s * maps.words_per_map() + static_cast<std::size_t>(cell / 64)] |= std::uint64_t{1} << (cell % 64);
+      maps.words[s * maps.words_per_map() + static_cast<std::size_t>(cell / 64)] |= std::uint64_t{1}
+                                                                                    << (cell % 64);
     }
   }
   return maps;
 }
 
-// Under soft light, the stored Gaussians (halves, turned axes) give what the map gives. The fit's own error for these maps
-// is 7 % on the hemisphere and 18 % on the sphere, whose axes lie farther apart.
+// Under soft light, the stored Gaussians (halves, turned axes) give what the map gives. The fit's
+// own error for these maps is 7 % on the hemisphere and 18 % on the sphere, whose axes lie farther
+// apart.
 TEST(SgFit, StoredGaussiansStandForTheMap) {
   const double light = 20;
   const LatLongGrid grid(kN);
@@ -64,8 +68,8 @@ TEST(SgFit, StoredGaussiansStandForTheMap) {
         double truth = 0;
         for (int cell = 0; cell < kN * kN; ++cell) {
           if (!map.open(cell / kN, cell % kN)) continue;
-          truth += grid.solid_angle(cell / kN) * sg_value({direction, light}, grid.centre(cell / kN, cell % kN)) /
-                   sg_mass(light);
+          truth += grid.solid_angle(cell / kN) *
+                   sg_value({direction, light}, grid.centre(cell / kN, cell % kN)) / sg_mass(light);
         }
         error += std::abs(sg_sum_integral(axes, weights, sgs.sharpness, direction, light) - truth);
         total += truth;
@@ -94,8 +98,10 @@ TEST(SgFitEndToEnd, SameForAnyNumberOfThreads) {
   }
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, 2);
   const SgVisibility two = fit_sgs(maps, VisibilitySettings{});
-  EXPECT_EQ(std::memcmp(one.weights.data(), two.weights.data(), one.weights.size() * sizeof(Half)), 0);
-  EXPECT_EQ(std::memcmp(one.rotation.data(), two.rotation.data(), one.rotation.size() * sizeof(Half)), 0);
+  EXPECT_EQ(std::memcmp(one.weights.data(), two.weights.data(), one.weights.size() * sizeof(Half)),
+            0);
+  EXPECT_EQ(
+      std::memcmp(one.rotation.data(), two.rotation.data(), one.rotation.size() * sizeof(Half)), 0);
 }
 
 }  // namespace

@@ -23,7 +23,8 @@ const VisibilityMaps& fabric_maps() {
   static const VisibilityMaps maps = [] {
     const TileScene scene(synthesize(test::small_fabric()));
     const SegmentOrigins origins = find_segment_origins(scene, false, OriginChoice::kExposed, 1);
-    return bake_visibility_maps(scene, origins, false, 0, static_cast<std::uint32_t>(scene.exemplar().segment_count()));
+    return bake_visibility_maps(scene, origins, false, 0,
+                                static_cast<std::uint32_t>(scene.exemplar().segment_count()));
   }();
   return maps;
 }
@@ -35,7 +36,8 @@ VisibilityMaps seeing_maps(std::size_t count) {
   for (std::size_t s = 0; s < all.count() && maps.count() < count; ++s) {
     if (all.sees_nothing[s] != 0) continue;
     const auto begin = all.words.begin() + static_cast<std::ptrdiff_t>(s * all.words_per_map());
-    maps.words.insert(maps.words.end(), begin, begin + static_cast<std::ptrdiff_t>(all.words_per_map()));
+    maps.words.insert(maps.words.end(), begin,
+                      begin + static_cast<std::ptrdiff_t>(all.words_per_map()));
     maps.sees_nothing.push_back(0);
   }
   return maps;
@@ -56,10 +58,10 @@ Eigen::ArrayXd reconstruction(const SsdfVisibility& ssdf, std::size_t segment) {
   for (int cell = 0; cell < kCells; ++cell) {
     double sum = ssdf.mean[static_cast<std::size_t>(cell)];
     for (int k = 0; k < ssdf.components; ++k) {
-      sum +=
-          static_cast<double>(float_from_half(
-              ssdf.coefficients[segment * static_cast<std::size_t>(ssdf.components) + static_cast<std::size_t>(k)])) *
-          ssdf.basis[static_cast<std::size_t>(cell * ssdf.components + k)];
+      sum += static_cast<double>(float_from_half(
+                 ssdf.coefficients[segment * static_cast<std::size_t>(ssdf.components) +
+                                   static_cast<std::size_t>(k)])) *
+             ssdf.basis[static_cast<std::size_t>(cell * ssdf.components + k)];
     }
     distance[cell] = sum;
   }
@@ -74,9 +76,9 @@ Eigen::ArrayXd cell_weights() {
   return weights;
 }
 
-// As many components as maps: nothing is lost but the rounding of coefficients to halves, 2^-11 of each, whose sum over
-// the components is bounded by the norm of the distances: 0.5 sqrt(2 pi) / 2^11 per component at most, and far below
-// 0.01 in the mean over cells.
+// As many components as maps: nothing is lost but the rounding of coefficients to halves, 2^-11 of
+// each, whose sum over the components is bounded by the norm of the distances: 0.5 sqrt(2 pi) /
+// 2^11 per component at most, and far below 0.01 in the mean over cells.
 TEST(SsdfFit, AllComponentsGiveTheDistancesBack) {
   const VisibilityMaps maps = seeing_maps(20);
   VisibilitySettings settings;
@@ -114,7 +116,8 @@ TEST(SsdfFitAgreement, ResidualIsThatOfTheExactComponents) {
   for (Eigen::Index s = 0; s < count; ++s) {
     const Eigen::ArrayXd distance = limited_distance(maps.map(static_cast<std::size_t>(s)));
     deviations.col(s) = distance.matrix();
-    residual += (weights * (reconstruction(ssdf, static_cast<std::size_t>(s)) - distance).square()).sum();
+    residual +=
+        (weights * (reconstruction(ssdf, static_cast<std::size_t>(s)) - distance).square()).sum();
   }
   deviations.colwise() -= deviations.rowwise().mean().eval();
   deviations.array().colwise() *= weights.sqrt();
@@ -125,8 +128,9 @@ TEST(SsdfFitAgreement, ResidualIsThatOfTheExactComponents) {
   EXPECT_LT(residual, 1.001 * best);
 }
 
-// The subset is large enough where segments outside it are described about as well as with all of them inside. With 2.6 %
-// of the hemisphere on the wrong side this loose fabric of thick fibers is harder than those of configs/fabrics (1 %).
+// The subset is large enough where segments outside it are described about as well as with all of
+// them inside. With 2.6 % of the hemisphere on the wrong side this loose fabric of thick fibers is
+// harder than those of configs/fabrics (1 %).
 TEST(SsdfFitStability, SegmentsOutsideTheSubset) {
   const VisibilityMaps maps = seeing_maps(100000);
   ASSERT_GT(maps.count(), 300U);
@@ -173,7 +177,9 @@ TEST(SsdfFitEndToEnd, SameForAnyNumberOfThreads) {
   const SsdfVisibility two = fit_ssdf(maps, VisibilitySettings{});
   EXPECT_EQ(one.mean, two.mean);
   EXPECT_EQ(one.basis, two.basis);
-  EXPECT_EQ(std::memcmp(one.coefficients.data(), two.coefficients.data(), one.coefficients.size() * sizeof(Half)), 0);
+  EXPECT_EQ(std::memcmp(one.coefficients.data(), two.coefficients.data(),
+                        one.coefficients.size() * sizeof(Half)),
+            0);
 }
 
 }  // namespace

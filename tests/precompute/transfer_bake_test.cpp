@@ -25,7 +25,8 @@ TransferSettings settings_of(int order, int paths, bool both_sides) {
 }
 
 // Light 1 from everywhere on white fibers: indirect light fills exactly what the sky does not,
-// sqrt(4 pi) a[0][j] + integral of V Y_j = sqrt(4 pi) delta_j0, V the mean visibility of the cell's segments, weighted as the baker weights them.
+// sqrt(4 pi) a[0][j] + integral of V Y_j = sqrt(4 pi) delta_j0, V the mean visibility of the cell's
+// segments, weighted as the baker weights them.
 TEST(TransferBakeStatistical, FurnaceBalancesVisibility) {
   Exemplar exemplar = synthesize(test::small_fabric());
   exemplar.scattering = {test::white_fiber()};
@@ -53,7 +54,8 @@ TEST(TransferBakeStatistical, FurnaceBalancesVisibility) {
     for (int i = 0; i < samples; ++i) {
       RandomStream random(1, RandomStage::kTest, 30 + cell, static_cast<std::uint64_t>(i));
       std::uint32_t s = segments[random.index(segments.size())];
-      while (random.uniform() * most_open > origins.openness[s] + kLeastOpenness) s = segments[random.index(segments.size())];
+      while (random.uniform() * most_open > origins.openness[s] + kLeastOpenness)
+        s = segments[random.index(segments.size())];
       const Vec3 w = sample_sphere(random);
       if (scene.occluded({origins.position[s], w}, exemplar.segment_fiber[s])) continue;
       float y[9];
@@ -64,11 +66,13 @@ TEST(TransferBakeStatistical, FurnaceBalancesVisibility) {
       }
     }
     for (int j = 0; j < 9; ++j) {
-      const double indirect = std::sqrt(4 * kPi) * transfer.matrices[(static_cast<std::size_t>(cell) * 81 + j) * 3];
+      const double indirect =
+          std::sqrt(4 * kPi) * transfer.matrices[(static_cast<std::size_t>(cell) * 81 + j) * 3];
       const double expected = j == 0 ? std::sqrt(4 * kPi) : 0;
       const int band = j == 0 ? 0 : j < 4 ? 1 : 2;
       const double from_transfer =
-          std::sqrt(4 * kPi) * transfer.standard_error[(static_cast<std::size_t>(cell) * 3 + band) * 3];
+          std::sqrt(4 * kPi) *
+          transfer.standard_error[(static_cast<std::size_t>(cell) * 3 + band) * 3];
       const double from_visibility = std::sqrt((open_squares[j] - open[j] * open[j]) / samples);
       const double z = (indirect + open[j] - expected) / std::hypot(from_transfer, from_visibility);
       worst = std::max(worst, std::abs(z));
@@ -77,7 +81,8 @@ TEST(TransferBakeStatistical, FurnaceBalancesVisibility) {
   }
   std::printf("stored furnace: %d sums, worst %.2f standard errors\n", compared, worst);
   EXPECT_GT(compared, 50);
-  // The stored error is the rms of a band's entries; 5.5 leaves room for the unevenness within a band.
+  // The stored error is the rms of a band's entries; 5.5 leaves room for the unevenness within a
+  // band.
   EXPECT_LT(worst, 5.5);
 }
 
@@ -101,7 +106,8 @@ TEST(TransferBakeLaw, FaceLightIsPartOfLightFromBothSides) {
 Exemplar filaments() {
   std::vector<Vec2> places;
   for (int y = 0; y < 6; ++y) {
-    for (int z = 0; z < 4; ++z) places.emplace_back(0.03F * (static_cast<float>(y) + 0.5F), 0.03F * static_cast<float>(z));
+    for (int z = 0; z < 4; ++z)
+      places.emplace_back(0.03F * (static_cast<float>(y) + 0.5F), 0.03F * static_cast<float>(z));
   }
   FiberScattering silk;
   silk.color_r = Rgbd(0.7, 0.2, 0.1);
@@ -129,10 +135,12 @@ TEST(TransferBakeLaw, ConesSortPathsAndLoseNone) {
   const SegmentCells cells = make_segment_cells(exemplar, origins, 0.1F);
   TransferSettings settings = settings_of(3, 8192, false);
   settings.cones = TransferSettings::Cones::kOff;
-  const TransferChunk without = TransferBaker(scene, materials, origins, settings, cells).bake(0, cells.count);
+  const TransferChunk without =
+      TransferBaker(scene, materials, origins, settings, cells).bake(0, cells.count);
   EXPECT_FALSE(without.cones.has_value());
   settings.cones = TransferSettings::Cones::kAuto;  // these fibers are parallel and specular
-  const TransferChunk with = TransferBaker(scene, materials, origins, settings, cells).bake(0, cells.count);
+  const TransferChunk with =
+      TransferBaker(scene, materials, origins, settings, cells).bake(0, cells.count);
   ASSERT_TRUE(with.cones.has_value());
 
   // The matrices are those of all paths, to rounding.
@@ -140,11 +148,13 @@ TEST(TransferBakeLaw, ConesSortPathsAndLoseNone) {
   double difference = 0;
   for (std::size_t i = 0; i < with.matrices.size(); ++i) {
     largest = std::max(largest, std::abs(static_cast<double>(without.matrices[i])));
-    difference = std::max(difference, std::abs(static_cast<double>(with.matrices[i]) - without.matrices[i]));
+    difference =
+        std::max(difference, std::abs(static_cast<double>(with.matrices[i]) - without.matrices[i]));
   }
   EXPECT_LT(difference, 1e-5 * largest);
 
-  // Over all azimuths, f_d is sqrt(2 pi) times its constant's coefficient; the mean over directions has Y_0 = 1 / sqrt(4 pi) before it.
+  // Over all azimuths, f_d is sqrt(2 pi) times its constant's coefficient; the mean over directions
+  // has Y_0 = 1 / sqrt(4 pi) before it.
   constexpr std::size_t n = 16;
   double on_cones = 0;
   double all = 0;
@@ -153,15 +163,19 @@ TEST(TransferBakeLaw, ConesSortPathsAndLoseNone) {
       for (std::size_t c = 0; c < 3; ++c) {
         double moments = 0;
         for (std::size_t d = 0; d < ConeTransfer::kWidths; ++d) {
-          moments += with.cones->moments[((cell * ConeTransfer::kWidths + d) * n + j0) * ConeTransfer::kAzimuths * 3 + c];
+          moments += with.cones->moments[((cell * ConeTransfer::kWidths + d) * n + j0) *
+                                             ConeTransfer::kAzimuths * 3 +
+                                         c];
         }
-        EXPECT_NEAR(with.cones->harmonics[((cell * n + j0) * n) * 3 + c], moments * std::sqrt(0.5), 1e-5 * largest);
+        EXPECT_NEAR(with.cones->harmonics[((cell * n + j0) * n) * 3 + c], moments * std::sqrt(0.5),
+                    1e-5 * largest);
       }
     }
     on_cones += with.cones->harmonics[cell * n * n * 3];
     all += with.matrices[cell * n * n * 3];
   }
-  // Red light reflects at 1 degree and wander is 2 to 3 degrees: most of the light stays on cones, but light through fibers (10 degrees each) does not for long.
+  // Red light reflects at 1 degree and wander is 2 to 3 degrees: most of the light stays on cones,
+  // but light through fibers (10 degrees each) does not for long.
   EXPECT_GT(on_cones, 0.3 * all);
   EXPECT_LT(on_cones, 0.95 * all);
 }
@@ -213,8 +227,10 @@ TEST(TransferBakeStatistical, StoredErrorIsTheSpreadOverSeeds) {
     stated += static_cast<double>(chunk.standard_error[0]) * chunk.standard_error[0] / seeds;
   }
   const double variance = (squares - sum * sum / seeds) / (seeds - 1);
-  std::printf("standard error stated %.3g, spread over seeds %.3g\n", std::sqrt(stated), std::sqrt(variance));
-  // The variance of 24 values is known to sqrt(2 / 23) = 29 %, that of the statement to about 7 %: 3.3 deviations.
+  std::printf("standard error stated %.3g, spread over seeds %.3g\n", std::sqrt(stated),
+              std::sqrt(variance));
+  // The variance of 24 values is known to sqrt(2 / 23) = 29 %, that of the statement to about 7
+  // %: 3.3 deviations.
   EXPECT_NEAR(variance / stated, 1, 1.0);
 }
 

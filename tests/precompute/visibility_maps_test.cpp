@@ -20,7 +20,8 @@ namespace {
 constexpr int kN = VisibilityMaps::kResolution;
 
 VisibilityMaps bake_all(const TileScene& scene, bool both_sides) {
-  const SegmentOrigins origins = find_segment_origins(scene, both_sides, OriginChoice::kMidpoint, 1);
+  const SegmentOrigins origins =
+      find_segment_origins(scene, both_sides, OriginChoice::kMidpoint, 1);
   return bake_visibility_maps(scene, origins, both_sides, 0,
                               static_cast<std::uint32_t>(scene.exemplar().segment_count()));
 }
@@ -45,8 +46,8 @@ TEST(VisibilityMaps, AFiberDoesNotSeeItselfInAnyCopyOfTheTile) {
   }
 }
 
-// Two parallel fibers without end and their copies: in the plane across them, the sky is the circle less the angle
-// 2 asin(radius / distance) about the direction of each copy of the other fiber.
+// Two parallel fibers without end and their copies: in the plane across them, the sky is the circle
+// less the angle 2 asin(radius / distance) about the direction of each copy of the other fiber.
 TEST(VisibilityMapsLaw, ParallelFibersHideTheAngleTheySubtend) {
   const float height = 0.7F;
   const std::vector<Vec2> places = {Vec2(0.2F, 0), Vec2(0.32F, 0.09F)};
@@ -63,19 +64,22 @@ TEST(VisibilityMapsLaw, ParallelFibersHideTheAngleTheySubtend) {
     for (int row = 0; row < kN; ++row) {
       for (int column = 0; column < kN; ++column) {
         const Vec3d w = grid.centre(row, column);
-        double nearest_limit = kPi;  // angle between the direction and the limit of a shadow, in the plane
+        // angle between the direction and the limit of a shadow, in the plane
+        double nearest_limit = kPi;
         bool hidden = false;
-        // Copies farther off lie lower than the row next to the horizon, half a cell = 0.012 above it.
+        // Copies farther off lie lower than the row next to the horizon, half a cell = 0.012 above
+        // it.
         for (int copy = -20; copy <= 20; ++copy) {
           const double y = to_other.x() + copy * static_cast<double>(height);
-          const double between =
-              std::abs(std::remainder(std::atan2(w.z(), w.y()) - std::atan2(to_other.y(), y), 2 * kPi));
+          const double between = std::abs(
+              std::remainder(std::atan2(w.z(), w.y()) - std::atan2(to_other.y(), y), 2 * kPi));
           const double half_angle = std::asin(radius / std::hypot(y, to_other.y()));
           nearest_limit = std::min(nearest_limit, std::abs(between - half_angle));
           hidden |= between < half_angle;
         }
         if (nearest_limit < 1e-5) continue;
-        ASSERT_EQ(map.open(row, column), !hidden) << "segment " << s << " row " << row << " column " << column;
+        ASSERT_EQ(map.open(row, column), !hidden)
+            << "segment " << s << " row " << row << " column " << column;
         closed += hidden ? 1 : 0;
       }
     }
@@ -84,7 +88,8 @@ TEST(VisibilityMapsLaw, ParallelFibersHideTheAngleTheySubtend) {
 }
 
 TEST(VisibilityMaps, ASegmentInsideAnotherFiberSeesNothing) {
-  const TileScene scene(test::straight_fibers(1, 1, {Vec2(0.5F, 0), Vec2(0.51F, 0.01F)}, 0.05F, 3, {}));
+  const TileScene scene(
+      test::straight_fibers(1, 1, {Vec2(0.5F, 0), Vec2(0.51F, 0.01F)}, 0.05F, 3, {}));
   const VisibilityMaps maps = bake_all(scene, true);
   for (std::size_t s = 0; s < maps.count(); ++s) {
     EXPECT_EQ(maps.sees_nothing[s], 1);
@@ -92,13 +97,15 @@ TEST(VisibilityMaps, ASegmentInsideAnotherFiberSeesNothing) {
   }
 }
 
-// What the projection of hit fibers closes, a ray of its own would have closed too. Rays that graze a fiber within
-// rounding may differ: none did in 5 million cells of three fabrics, 1 in 100,000 is allowed.
+// What the projection of hit fibers closes, a ray of its own would have closed too. Rays that graze
+// a fiber within rounding may differ: none did in 5 million cells of three fabrics, 1 in 100,000 is
+// allowed.
 TEST(VisibilityMapsAgreement, OneOcclusionRayPerCell) {
   for (const bool both_sides : {false, true}) {
     const TileScene scene(synthesize(test::small_fabric("twill 2/2")));
     const Exemplar& exemplar = scene.exemplar();
-    const SegmentOrigins origins = find_segment_origins(scene, both_sides, OriginChoice::kExposed, 1);
+    const SegmentOrigins origins =
+        find_segment_origins(scene, both_sides, OriginChoice::kExposed, 1);
     const LatLongGrid grid(kN);
     int cells = 0;
     int different = 0;

@@ -32,7 +32,8 @@ TEST(VisibilitySettings, DefaultsFollowTheSideOfTheLight) {
 
 TEST(VisibilitySettings, ThePaperCanBeAskedFor) {
   const VisibilitySettings settings = read(
-      "components = 32\npca_segments = 500\nsg_count = 24\nsg_axes = \"printed\"\nsg_sharpness = 128\n"
+      "components = 32\npca_segments = 500\nsg_count = 24\nsg_axes = \"printed\"\nsg_sharpness = "
+      "128\n"
       "sg_weights = \"voronoi\"\n",
       false);
   EXPECT_EQ(settings.components, 32);
@@ -44,9 +45,9 @@ TEST(VisibilitySettings, ThePaperCanBeAskedFor) {
 }
 
 TEST(VisibilitySettings, RejectsWhatIsOutOfRangeOrUnknown) {
-  for (const char* text :
-       {"components = 0", "components = 129", "pca_segments = 0", "sg_count = 0", "sg_count = 257",
-        "sg_sharpness = 0.5", "sg_sharpness = nan", "sg_axes = \"cube\"", "sg_weights = 1", "resolution = 128"}) {
+  for (const char* text : {"components = 0", "components = 129", "pca_segments = 0", "sg_count = 0",
+                           "sg_count = 257", "sg_sharpness = 0.5", "sg_sharpness = nan",
+                           "sg_axes = \"cube\"", "sg_weights = 1", "resolution = 128"}) {
     EXPECT_THROW(read(text, false), ConfigError) << text;
   }
 }

@@ -23,12 +23,14 @@ TEST(Camera, CentreLooksAtTheTarget) {
   const CameraConfig config = oblique();
   const Camera camera(config);
   const EyeRay ray = camera.ray(100, 50);
-  EXPECT_LT((ray.direction.cast<double>() - (config.look_at - config.position).normalized()).norm(), 1e-6);
+  EXPECT_LT((ray.direction.cast<double>() - (config.look_at - config.position).normalized()).norm(),
+            1e-6);
   EXPECT_NEAR(camera.depth(config.look_at), (config.look_at - config.position).norm(), 1e-9);
 }
 
 double angle(const EyeRay& a, const EyeRay& b) {
-  return std::acos(a.direction.cast<double>().normalized().dot(b.direction.cast<double>().normalized()));
+  return std::acos(
+      a.direction.cast<double>().normalized().dot(b.direction.cast<double>().normalized()));
 }
 
 TEST(Camera, FootprintsGrowAlongARayAsWithDepth) {

@@ -22,11 +22,12 @@ ClothMesh drape() {
 }
 
 TriangleMesh square(float z, float half) {
-  return {{{-half, -half, z}, {half, -half, z}, {half, half, z}, {-half, half, z}}, {{0, 1, 2}, {0, 2, 3}}};
+  return {{{-half, -half, z}, {half, -half, z}, {half, half, z}, {-half, half, z}},
+          {{0, 1, 2}, {0, 2, 3}}};
 }
 
-// Rays from above onto the middle of a swatch meet the same segments at the same places as on the endless
-// flat tile.
+// Rays from above onto the middle of a swatch meet the same segments at the same places as on the
+// endless flat tile.
 TEST(ClothSceneAgreement, FlatSwatchIsTheFlatTile) {
   const auto tile = small_tile();
   const ClothScene scene({{tile, flat_cloth(40, 40)}}, {});
@@ -58,7 +59,8 @@ TEST(ClothSceneAgreement, FlatSwatchIsTheFlatTile) {
     const auto next = scene.first_fiber({hit->position, next_direction, &*hit});
     // The flat tile goes on for ever; nearly parallel rays reach the swatch's rim.
     if (std::abs(next_direction.z()) < 0.05F) continue;
-    if (next.has_value() != next_expected.has_value() || (next && next->segment != next_expected->segment))
+    if (next.has_value() != next_expected.has_value() ||
+        (next && next->segment != next_expected->segment))
       ++differing;
   }
   std::printf("  %d of %d rays hit, %d differ\n", hits, kRays, differing);
@@ -101,8 +103,8 @@ TEST(ClothSceneAgreement, OverlappingShells) {
   int from_lower = 0;
   for (int k = 0; k < 5000; ++k) {
     const Vec3 direction = sample_sphere(random);
-    const Vec3d origin =
-        Vec3d(random.uniform_double(), random.uniform_double(), 0.05) - 5 * direction.cast<double>();
+    const Vec3d origin = Vec3d(random.uniform_double(), random.uniform_double(), 0.05) -
+                         5 * direction.cast<double>();
     const auto a = lower.first_fiber({origin, direction});
     const auto b = upper.first_fiber({origin, direction});
     const auto found = both.first_fiber({origin, direction});
@@ -155,7 +157,8 @@ TEST(ClothScene, UnderlayIsJustBelowTheFibers) {
 TEST(ClothScene, PiecesOfOneFabricShareTheirMaterials) {
   const auto one = small_tile();
   const auto other = std::make_shared<TileScene>(single_fiber(white_isotropic()));
-  const ClothScene scene({{one, flat_cloth(1, 1)}, {other, flat_cloth(1, 1)}, {one, flat_cloth(1, 1)}}, {});
+  const ClothScene scene(
+      {{one, flat_cloth(1, 1)}, {other, flat_cloth(1, 1)}, {one, flat_cloth(1, 1)}}, {});
   EXPECT_EQ(scene.materials().size(), 2U);
   EXPECT_EQ(scene.material_offset(1), 1);
   EXPECT_EQ(scene.material_offset(2), 0);

@@ -68,8 +68,8 @@ TEST(ClothTrace, AMeshInsideTheShellEndsPaths) {
   RandomStream random(2, RandomStage::kTest, 0, 0);
   int ended = 0;
   for (int k = 0; k < 1000; ++k) {
-    const auto hit =
-        scene.first_fiber({Vec3d(random.uniform_double(), random.uniform_double(), 2), Vec3(0, 0, -1)});
+    const auto hit = scene.first_fiber(
+        {Vec3d(random.uniform_double(), random.uniform_double(), 2), Vec3(0, 0, -1)});
     if (!hit || hit->position.z() < 0) continue;
     const auto next = trace.next(trace.vertex(*hit), Vec3(0, 0.1F, -1).normalized());
     ASSERT_TRUE(next);

@@ -46,7 +46,8 @@ TEST(EnvironmentMap, ConventionIsThatOfTheHeader) {
   EXPECT_EQ(at(-1, -0.1, 0.1), 8 + 7);
   for (int row = 0; row < 4; ++row) {
     for (int column = 0; column < 8; ++column) {
-      EXPECT_EQ(map.radiance(map.centre(row, column).cast<float>())[0], static_cast<float>(8 * row + column));
+      EXPECT_EQ(map.radiance(map.centre(row, column).cast<float>())[0],
+                static_cast<float>(8 * row + column));
     }
   }
 }
@@ -62,7 +63,8 @@ TEST(EnvironmentMapLaw, SolidAnglesCoverTheSphereAndIntegralIsExact) {
 }
 
 TEST(EnvironmentMapStatistical, SamplingIsWhatItSays) {
-  // The harness bins about x with 10 x 20 cells: turned so that its pole is ours, a cell is a pixel.
+  // The harness bins about x with 10 x 20 cells: turned so that its pole is ours, a cell is a
+  // pixel.
   const EnvironmentMap map = uneven(20, 10);
   const EnvironmentMap other = map.reduced(10, 10);
   RandomStream random(2, RandomStage::kTest, 0, 0);
@@ -70,10 +72,13 @@ TEST(EnvironmentMapStatistical, SamplingIsWhatItSays) {
   const auto back = [](const Vec3d& w) { return Vec3d(w.y(), w.z(), w.x()); };
   EXPECT_TRUE(chi_square_accepts(
       "environment", [&] { return turned(map.sample(random).direction.cast<double>()); },
-      [&](const Vec3d& w) { return static_cast<double>(map.pdf(back(w).cast<float>())); }, 100000, 2));
+      [&](const Vec3d& w) { return static_cast<double>(map.pdf(back(w).cast<float>())); }, 100000,
+      2));
   EXPECT_FALSE(chi_square_accepts(
-      "environment, density of another map", [&] { return turned(map.sample(random).direction.cast<double>()); },
-      [&](const Vec3d& w) { return static_cast<double>(other.pdf(back(w).cast<float>())); }, 100000, 2));
+      "environment, density of another map",
+      [&] { return turned(map.sample(random).direction.cast<double>()); },
+      [&](const Vec3d& w) { return static_cast<double>(other.pdf(back(w).cast<float>())); }, 100000,
+      2));
 }
 
 TEST(EnvironmentMapLaw, WeightTimesDensityIsRadianceAndMeanWeightTheIntegral) {
@@ -85,15 +90,18 @@ TEST(EnvironmentMapLaw, WeightTimesDensityIsRadianceAndMeanWeightTheIntegral) {
     EXPECT_NEAR(sample.direction.norm(), 1, 1e-6);
     ASSERT_GT(sample.pdf, 0);
     blue.add(static_cast<double>(sample.weight[2]));
-    if (k % 20 != 0 || sample.pdf != map.pdf(sample.direction)) continue;  // rounding may step over a pixel's edge
+    // rounding may step over a pixel's edge
+    if (k % 20 != 0 || sample.pdf != map.pdf(sample.direction)) continue;
     const Rgb radiance = map.radiance(sample.direction);
-    for (int c = 0; c < 3; ++c) EXPECT_NEAR(sample.weight[c] * sample.pdf, radiance[c], 1e-5F * radiance[c]);
+    for (int c = 0; c < 3; ++c)
+      EXPECT_NEAR(sample.weight[c] * sample.pdf, radiance[c], 1e-5F * radiance[c]);
   }
   EXPECT_TRUE(means_agree("mean weight", blue.mean(), blue.standard_error(), map.integral()[2], 0));
   double density = 0;
   for (int row = 0; row < 10; ++row) {
     for (int column = 0; column < 20; ++column) {
-      density += static_cast<double>(map.pdf(map.centre(row, column).cast<float>())) * map.solid_angle(row);
+      density += static_cast<double>(map.pdf(map.centre(row, column).cast<float>())) *
+                 map.solid_angle(row);
     }
   }
   EXPECT_NEAR(density, 1, 1e-6);
@@ -135,7 +143,8 @@ TEST(EnvironmentMapFormat, ReadsBothFormatsAndRefusesBadRadiance) {
     EXPECT_EQ(map.pixel(0, 0)[2], 1);
     EXPECT_EQ(map.pixel(0, 1)[0], 0.5F);
   }
-  for (const float bad : {-1.0F, std::numeric_limits<float>::infinity(), std::numeric_limits<float>::quiet_NaN()}) {
+  for (const float bad :
+       {-1.0F, std::numeric_limits<float>::infinity(), std::numeric_limits<float>::quiet_NaN()}) {
     image.channels["G"].values[1] = bad;
     write_exr(folder.path() / "b.exr", image);
     EXPECT_THROW(EnvironmentMap::read(folder.path() / "b.exr"), FileError);

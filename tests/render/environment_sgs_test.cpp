@@ -21,7 +21,8 @@ EnvironmentMap map_of(const std::vector<Light>& lights, int width, int height) {
   for (int row = 0, k = 0; row < height; ++row) {
     for (int column = 0; column < width; ++column, ++k) {
       for (const Light& light : lights) {
-        radiance[static_cast<std::size_t>(k)] += light_radiance(light, grid.centre(row, column).cast<float>());
+        radiance[static_cast<std::size_t>(k)] +=
+            light_radiance(light, grid.centre(row, column).cast<float>());
       }
     }
   }
@@ -36,7 +37,8 @@ double relative_error(const EnvironmentMap& map, const std::vector<Light>& light
     for (int column = 0; column < map.width(); ++column) {
       Rgb difference = map.pixel(row, column);
       norm += map.solid_angle(row) * static_cast<double>(difference.matrix().squaredNorm());
-      for (const Light& light : lights) difference -= light_radiance(light, map.centre(row, column).cast<float>());
+      for (const Light& light : lights)
+        difference -= light_radiance(light, map.centre(row, column).cast<float>());
       error += map.solid_angle(row) * static_cast<double>(difference.matrix().squaredNorm());
     }
   }
@@ -50,12 +52,14 @@ TEST(EnvironmentSgs, FindsOneGaussian) {
   EXPECT_LT(fit.relative_error, 2e-3);  // a blurred Gaussian is not quite one
   EXPECT_GT(fit.lights[0].axis.dot(light.axis), 1 - 1e-6F);
   EXPECT_NEAR(fit.lights[0].sharpness, 40, 0.8);  // pixels of 2.8 degrees add 1 % to its variance
-  for (int c = 0; c < 3; ++c) EXPECT_NEAR(fit.lights[0].irradiance[c], light.irradiance[c], 0.01 * light.irradiance[c]);
+  for (int c = 0; c < 3; ++c)
+    EXPECT_NEAR(fit.lights[0].irradiance[c], light.irradiance[c], 0.01 * light.irradiance[c]);
 }
 
 TEST(EnvironmentSgs, FindsSeveralOnTopOfAConstant) {
-  const std::vector<Light> lights = {sg_light({0, 0, 1}, 0, {20, 20, 30}), sg_light({1, 0, 1}, 30, {6, 5, 4}),
-                                     sg_light({-1, 1, 0.2F}, 90, {3, 3, 3}), sg_light({0, -1, 0}, 8, {0, 4, 8})};
+  const std::vector<Light> lights = {
+      sg_light({0, 0, 1}, 0, {20, 20, 30}), sg_light({1, 0, 1}, 30, {6, 5, 4}),
+      sg_light({-1, 1, 0.2F}, 90, {3, 3, 3}), sg_light({0, -1, 0}, 8, {0, 4, 8})};
   const EnvironmentSgs fit = fit_environment_sgs(map_of(lights, 256, 128), 4);
   EXPECT_LT(fit.relative_error, 5e-3);  // the constant's sharpness stays a little above 0
   EXPECT_NEAR(fit.lights[0].irradiance[2], 30, 0.3);
@@ -67,7 +71,8 @@ EnvironmentMap busy_map() {
   for (int k = 0; k < 30; ++k) {
     const Vec3 axis = sample_sphere(random);
     const float sharpness = 5 * std::exp2(3 * random.uniform());
-    lights.push_back(sg_light(axis, sharpness, Rgb(random.uniform(), random.uniform(), random.uniform())));
+    lights.push_back(
+        sg_light(axis, sharpness, Rgb(random.uniform(), random.uniform(), random.uniform())));
   }
   return map_of(lights, 96, 48);
 }
@@ -80,7 +85,8 @@ TEST(EnvironmentSgsLaw, MoreGaussiansNeverDoWorse) {
     const EnvironmentSgs fit = fit_environment_sgs(map, count);
     EXPECT_LT(fit.relative_error, before) << count;
     // Most of this map is broader than the blur.
-    EXPECT_NEAR(fit.relative_error, relative_error(map, fit.lights), 0.3 * fit.relative_error) << count;
+    EXPECT_NEAR(fit.relative_error, relative_error(map, fit.lights), 0.3 * fit.relative_error)
+        << count;
     before = fit.relative_error;
     errors.push_back(before);
     for (const Light& light : fit.lights) {
@@ -93,11 +99,13 @@ TEST(EnvironmentSgsLaw, MoreGaussiansNeverDoWorse) {
   EXPECT_LT(errors.back(), 0.5 * errors.front());  // half of the Gaussians that the map is made of
 }
 
-// Where least squares leaves no residual along a Gaussian, the light's total is nearly that of the map.
+// Where least squares leaves no residual along a Gaussian, the light's total is nearly that of the
+// map.
 TEST(EnvironmentSgsLaw, TotalLightIsNearlyKept) {
   const EnvironmentMap map = busy_map();
   Rgbd sum = Rgbd::Zero();
-  for (const Light& light : fit_environment_sgs(map, 16).lights) sum += light.irradiance.cast<double>();
+  for (const Light& light : fit_environment_sgs(map, 16).lights)
+    sum += light.irradiance.cast<double>();
   EXPECT_LT(((sum - map.integral()) / map.integral()).abs().maxCoeff(), 0.05);
 }
 
@@ -112,7 +120,8 @@ TEST(EnvironmentSgs, EqualMapsGiveEqualLights) {
 }
 
 TEST(EnvironmentSgsStability, BlackAndTinyMapsAndASun) {
-  const EnvironmentSgs black = fit_environment_sgs(EnvironmentMap(4, 2, std::vector<Rgb>(8, Rgb::Zero())), 3);
+  const EnvironmentSgs black =
+      fit_environment_sgs(EnvironmentMap(4, 2, std::vector<Rgb>(8, Rgb::Zero())), 3);
   EXPECT_EQ(black.lights.size(), 3U);
   EXPECT_EQ(black.relative_error, 0);
   EXPECT_EQ(black.lights[0].irradiance.maxCoeff(), 0);
@@ -120,7 +129,8 @@ TEST(EnvironmentSgsStability, BlackAndTinyMapsAndASun) {
   const EnvironmentSgs one = fit_environment_sgs(EnvironmentMap(1, 1, {Rgb(1, 2, 3)}), 2);
   EXPECT_LT(one.relative_error, 1e-3);
 
-  // One pixel a million times as bright as the sky, which holds 12 times its light: one Gaussian each.
+  // One pixel a million times as bright as the sky, which holds 12 times its light: one Gaussian
+  // each.
   std::vector<Rgb> sky(512 * 256, Rgb::Constant(1));
   sky[512 * 60 + 100] = Rgb::Constant(1e6F);
   const EnvironmentMap map(512, 256, sky);
@@ -128,7 +138,8 @@ TEST(EnvironmentSgsStability, BlackAndTinyMapsAndASun) {
   const double light_of_sun = 1e6 * map.solid_angle(60);
   const Light& sun = fit.lights[0];
   EXPECT_NEAR(sun.irradiance[0], light_of_sun, 0.01 * light_of_sun);
-  EXPECT_GT(sun.axis.cast<double>().dot(map.centre(60, 100)), std::cos(0.0125)) << "the fit's pixels are 0.0245 wide";
+  EXPECT_GT(sun.axis.cast<double>().dot(map.centre(60, 100)), std::cos(0.0125))
+      << "the fit's pixels are 0.0245 wide";
   EXPECT_GT(sun.sharpness, 1000);
   EXPECT_NEAR(fit.lights[1].irradiance[0], 4 * kPi, 0.05 * 4 * kPi);
 }

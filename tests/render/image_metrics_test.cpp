@@ -26,12 +26,14 @@ TEST(ImageMetrics, MaskedPixelsDoNotCount) {
   const PictureError error = compare_pictures(picture, {reference, reference}, mask);
   EXPECT_EQ(error.pixels, 2U);
   EXPECT_EQ(error.relative_rmse, 0);
-  EXPECT_EQ(compare_pictures(picture, {reference, reference}, std::vector<std::uint8_t>{0, 0, 0}).pixels, 0U);
+  EXPECT_EQ(
+      compare_pictures(picture, {reference, reference}, std::vector<std::uint8_t>{0, 0, 0}).pixels,
+      0U);
 }
 
-// Two noisy halves (uniform noise of amplitude a, variance a^2 / 3) around 1 against a picture that is off by
-// 0.05: the product of halves does not see the noise. Its standard error over n values is about (a^2 / 3) /
-// sqrt(n).
+// Two noisy halves (uniform noise of amplitude a, variance a^2 / 3) around 1 against a picture that
+// is off by 0.05: the product of halves does not see the noise. Its standard error over n values is
+// about (a^2 / 3) / sqrt(n).
 TEST(ImageMetricsStatistical, NoiseOfTheReferenceDoesNotCount) {
   constexpr std::size_t kPixels = 20000;
   constexpr float kNoise = 0.3F;
@@ -46,7 +48,8 @@ TEST(ImageMetricsStatistical, NoiseOfTheReferenceDoesNotCount) {
   }
   const std::vector<Rgb> picture(kPixels, Rgb(1.05F, 1.05F, 1.05F));
   const PictureError halved = compare_pictures(picture, {halves[0], halves[1]}, {});
-  const double standard_error = 0.03 / std::sqrt(3.0 * kPixels) + 2 * 0.05 * 0.17 / std::sqrt(3.0 * kPixels);
+  const double standard_error =
+      0.03 / std::sqrt(3.0 * kPixels) + 2 * 0.05 * 0.17 / std::sqrt(3.0 * kPixels);
   std::printf("  mean square %.6f +- %.6f against 0.0025\n", halved.mean_square, standard_error);
   EXPECT_NEAR(halved.mean_square, 0.0025, 4 * standard_error);
   const PictureError single = compare_pictures(picture, {halves[0], halves[0]}, {});
@@ -55,7 +58,8 @@ TEST(ImageMetricsStatistical, NoiseOfTheReferenceDoesNotCount) {
 
 TEST(ImageMetrics, RelativeNoise) {
   const std::vector<Rgb> reference = {Rgb(2, 2, 2), Rgb(1, 1, 1), Rgb(0, 0, 0)};
-  const std::vector<Rgb> variance = {Rgb(0.04F, 0.04F, 0.04F), Rgb(0.01F, 0.01F, 0.01F), Rgb(1, 1, 1)};
+  const std::vector<Rgb> variance = {Rgb(0.04F, 0.04F, 0.04F), Rgb(0.01F, 0.01F, 0.01F),
+                                     Rgb(1, 1, 1)};
   EXPECT_NEAR(relative_noise(variance, reference, {}), 0.1, 1e-6);
 }
 
@@ -79,8 +83,9 @@ TEST(ImageMetrics, EstimateOfAUniformFactor) {
   EXPECT_NEAR(estimate.percentile99, 0.15, 1e-6);
 }
 
-// The interval of many noisy pictures of known error holds that error in 95 % of them, within 4 standard errors of that count
-// (sqrt(400 * 0.95 * 0.05) = 4.4), and the same for the mean colour at 1.96 standard errors.
+// The interval of many noisy pictures of known error holds that error in 95 % of them, within 4
+// standard errors of that count (sqrt(400 * 0.95 * 0.05) = 4.4), and the same for the mean colour
+// at 1.96 standard errors.
 TEST(ImageMetricsStatistical, IntervalsHoldTheTruth) {
   constexpr int kPictures = 400;
   constexpr int kEdge = 32;
@@ -94,16 +99,20 @@ TEST(ImageMetricsStatistical, IntervalsHoldTheTruth) {
       for (int k = 0; k < kEdge * kEdge; ++k) {
         Rgb value;
         for (int c = 0; c < 3; ++c) {
-          value[c] = static_cast<float>(1 + kNoise * std::sqrt(12.0) * (static_cast<double>(random.uniform()) - 0.5));
+          value[c] = static_cast<float>(1 + kNoise * std::sqrt(12.0) *
+                                                (static_cast<double>(random.uniform()) - 0.5));
         }
         picture.push_back(value);
       }
     }
-    const PictureErrorEstimate estimate = estimate_error(pictures[0], {pictures[1], pictures[2]}, kEdge, kEdge, 4);
+    const PictureErrorEstimate estimate =
+        estimate_error(pictures[0], {pictures[1], pictures[2]}, kEdge, kEdge, 4);
     rmse_held += estimate.rmse_low <= kNoise && kNoise <= estimate.rmse_high ? 1 : 0;
-    color_held += std::abs(estimate.color_ratio[0] - 1) <= 1.96 * estimate.color_ratio_error[0] ? 1 : 0;
+    color_held +=
+        std::abs(estimate.color_ratio[0] - 1) <= 1.96 * estimate.color_ratio_error[0] ? 1 : 0;
   }
-  std::printf("  held by the interval: RMSE %d, colour %d of %d\n", rmse_held, color_held, kPictures);
+  std::printf("  held by the interval: RMSE %d, colour %d of %d\n", rmse_held, color_held,
+              kPictures);
   EXPECT_NEAR(rmse_held, 0.95 * kPictures, 4 * 4.4);
   EXPECT_NEAR(color_held, 0.95 * kPictures, 4 * 4.4);
 }

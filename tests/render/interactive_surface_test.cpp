@@ -30,7 +30,8 @@ std::shared_ptr<const InteractiveMicrocylinder> interactive_linen() {
 
 std::shared_ptr<const InteractiveSurface> bake(const ClothScene& scene, std::size_t surface) {
   const auto maps = [&](ClothSide side) {
-    return std::make_shared<const DistanceMaps>(bake_distance_maps(scene, scene.surfaces()[surface], side));
+    return std::make_shared<const DistanceMaps>(
+        bake_distance_maps(scene, scene.surfaces()[surface], side));
   };
   return std::make_shared<const InteractiveSurface>(interactive_linen(), maps(ClothSide::kFace),
                                                     maps(ClothSide::kBack));
@@ -57,9 +58,11 @@ Camera camera_from(const Vec3d& position, double wide, int pixels) {
 }
 
 /// Relative RMSE of the interactive picture of all surfaces against a path-traced one.
-double picture_error(const ClothScene& scene, const std::vector<Light>& lights, const Camera& camera, int spp) {
+double picture_error(const ClothScene& scene, const std::vector<Light>& lights,
+                     const Camera& camera, int spp) {
   PrecomputedSettings settings;
-  for (std::size_t k = 0; k < scene.surfaces().size(); ++k) settings.interactive.push_back(bake(scene, k));
+  for (std::size_t k = 0; k < scene.surfaces().size(); ++k)
+    settings.interactive.push_back(bake(scene, k));
   const PrecomputedRenderer renderer(scene, {}, lights, Rgb(0, 0, 0), settings);
   const PathTracer tracer(scene, {}, lights, Rgb(0, 0, 0), {});
   const PixelRect all = {0, 0, camera.width(), camera.height()};
@@ -69,7 +72,8 @@ double picture_error(const ClothScene& scene, const std::vector<Light>& lights, 
   double mean = 0;
   for (std::size_t k = 0; k < ours.pixel_count(); ++k) {
     EXPECT_TRUE((ours.multiple[k] == 0).all());
-    error += static_cast<double>(((ours.beauty[k] - truth.half0[k]) * (ours.beauty[k] - truth.half1[k])).mean());
+    error += static_cast<double>(
+        ((ours.beauty[k] - truth.half0[k]) * (ours.beauty[k] - truth.half1[k])).mean());
     mean += static_cast<double>(truth.beauty[k].mean());
   }
   const auto count = static_cast<double>(ours.pixel_count());
@@ -77,12 +81,16 @@ double picture_error(const ClothScene& scene, const std::vector<Light>& lights, 
 }
 
 TEST(InteractiveSurfaceAgreement, APictureIsNearThePathTracedOne) {
-  // A roof over a part of the cloth; 8 times 8 pixels of the open part, its penumbra and its shadow.
-  const TriangleMesh roof{{Vec3(0.5F, -3, 1), Vec3(4, -3, 1), Vec3(4, 3, 1), Vec3(0.5F, 3, 1)}, {{0, 1, 2}, {0, 2, 3}}};
-  const std::vector<SurfaceCloth> cloth = {{read_surface_model(surface_preset("linen-plain")), flat_cloth(4, 4, 24)}};
+  // A roof over a part of the cloth; 8 times 8 pixels of the open part, its penumbra and its
+  // shadow.
+  const TriangleMesh roof{{Vec3(0.5F, -3, 1), Vec3(4, -3, 1), Vec3(4, 3, 1), Vec3(0.5F, 3, 1)},
+                          {{0, 1, 2}, {0, 2, 3}}};
+  const std::vector<SurfaceCloth> cloth = {
+      {read_surface_model(surface_preset("linen-plain")), flat_cloth(4, 4, 24)}};
   const ClothScene open({}, {}, cloth);
   const ClothScene covered({}, {roof}, cloth);
-  const std::vector<Light> lights = {gaussian({-0.3F, 0.2F, 1}, 60), gaussian({0.6F, -0.6F, 1}, 200)};
+  const std::vector<Light> lights = {gaussian({-0.3F, 0.2F, 1}, 60),
+                                     gaussian({0.6F, -0.6F, 1}, 200)};
   const Camera camera = camera_from({-0.5, 0.3, 40}, 2, 8);
   const double in_the_open = picture_error(open, lights, camera, 1024);
   const double under_the_roof = picture_error(covered, lights, camera, 1024);
@@ -93,8 +101,10 @@ TEST(InteractiveSurfaceAgreement, APictureIsNearThePathTracedOne) {
 
 TEST(InteractiveSurface, BothSidesShowTheFaceWithTheirOwnShadows) {
   // Something large below the cloth: it hides light from below only.
-  const TriangleMesh floor{{Vec3(-90, -90, -0.5F), Vec3(90, -90, -0.5F), Vec3(0, 90, -0.5F)}, {{0, 1, 2}}};
-  const std::vector<SurfaceCloth> cloth = {{read_surface_model(surface_preset("linen-plain")), flat_cloth(4, 4, 4)}};
+  const TriangleMesh floor{{Vec3(-90, -90, -0.5F), Vec3(90, -90, -0.5F), Vec3(0, 90, -0.5F)},
+                           {{0, 1, 2}}};
+  const std::vector<SurfaceCloth> cloth = {
+      {read_surface_model(surface_preset("linen-plain")), flat_cloth(4, 4, 4)}};
   const ClothScene scene({}, {floor}, cloth);
   const ClothScene open({}, {}, cloth);
   const auto light_on = [](const ClothScene& in, float side, const Light& light) {
@@ -118,8 +128,9 @@ TEST(InteractiveSurface, BothSidesShowTheFaceWithTheirOwnShadows) {
 
 TEST(InteractiveSurface, ShellsOfFibersHideLight) {
   const auto tile = std::make_shared<TileScene>(single_fiber(test_cotton()));
-  const ClothScene scene({{tile, lifted(flat_cloth(30, 30), {0, 0, 1})}}, {},
-                         {{read_surface_model(surface_preset("linen-plain")), flat_cloth(2, 2, 2)}});
+  const ClothScene scene(
+      {{tile, lifted(flat_cloth(30, 30), {0, 0, 1})}}, {},
+      {{read_surface_model(surface_preset("linen-plain")), flat_cloth(2, 2, 2)}});
   const DistanceMaps maps = bake_distance_maps(scene, scene.surfaces()[0], ClothSide::kFace);
   EXPECT_LT(maps.evaluate(maps.coefficients(4), Vec3d(0, 0, 1)).distance, -radians(60));
 }

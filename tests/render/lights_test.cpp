@@ -28,11 +28,13 @@ TEST(LightsLaw, RadianceIntegratesToTheIrradiance) {
       integral += integrate(gauss_legendre(16, low / 2, low), [&](double one_minus_cosine) {
         const double c = 1 - one_minus_cosine;
         const Vec3d across = light.axis.cast<double>().unitOrthogonal();
-        const Vec3d direction = c * light.axis.cast<double>() + std::sqrt(std::max(0.0, 1 - c * c)) * across;
+        const Vec3d direction =
+            c * light.axis.cast<double>() + std::sqrt(std::max(0.0, 1 - c * c)) * across;
         return 2 * kPi * static_cast<double>(light_radiance(light, direction.cast<float>())[0]);
       });
     }
-    EXPECT_NEAR(integral, 3, 3e-4) << sharpness;  // directions are rounded to float: 1e-7 * sharpness
+    // directions are rounded to float: 1e-7 * sharpness
+    EXPECT_NEAR(integral, 3, 3e-4) << sharpness;
   }
 }
 
@@ -70,7 +72,8 @@ TEST(Lights, DirectionalLightIsFoundOnlyBySampling) {
 Light environment(double turn_deg) {
   std::vector<Rgb> radiance(8 * 4, Rgb(0.1F, 0.1F, 0.1F));
   for (int row = 0; row < 4; ++row) {
-    for (const int column : {3, 4}) radiance[static_cast<std::size_t>(8 * row + column)] = Rgb(3, 2, 1);
+    for (const int column : {3, 4})
+      radiance[static_cast<std::size_t>(8 * row + column)] = Rgb(3, 2, 1);
   }
   Light light;
   light.type = LightType::kEnvironment;
@@ -99,7 +102,8 @@ TEST(LightsLaw, AnEnvironmentsWeightTimesDensityIsRadiance) {
   }
 }
 
-// The Gaussians bring the environment's light in sum, each from where it was turned to, and other lights stay as they are.
+// The Gaussians bring the environment's light in sum, each from where it was turned to, and other
+// lights stay as they are.
 TEST(LightsAgreement, GaussiansStandForAnEnvironment) {
   const Light other = sg_light(20);
   const std::vector<Light> scene = {other, environment(90)};
@@ -116,7 +120,8 @@ TEST(LightsAgreement, GaussiansStandForAnEnvironment) {
     towards += fitted.lights[k].irradiance[0] * fitted.lights[k].axis;
   }
   const Rgbd integral = scene[1].map->integral();
-  for (int c = 0; c < 3; ++c) EXPECT_NEAR(sum[c] / (integral[c] * scene[1].irradiance[c]), 1, 0.1) << c;
+  for (int c = 0; c < 3; ++c)
+    EXPECT_NEAR(sum[c] / (integral[c] * scene[1].irradiance[c]), 1, 0.1) << c;
   EXPECT_GT(towards.normalized().y(), 0.95F);
 }
 

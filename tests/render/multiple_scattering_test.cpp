@@ -41,12 +41,13 @@ Transfer diagonal_transfer(int order, const std::array<float, 3>& diagonal, bool
   return transfer;
 }
 
-/// Integral over the sphere of f(direction) by a product rule in the inclination to and the azimuth about the
-/// frame's x axis, the coordinates in which the BCSDF is smooth.
+/// Integral over the sphere of f(direction) by a product rule in the inclination to and the azimuth
+/// about the frame's x axis, the coordinates in which the BCSDF is smooth.
 template <class Function>
 Rgbd integrate_sphere(const Mat3d& frame, Function&& f) {
   constexpr int kAzimuths = 96;
-  const QuadratureRule rule = gauss_legendre_panels(16, -kPi / 2, kPi / 2, {-1.5, -1.2, -0.6, 0, 0.6, 1.2, 1.5});
+  const QuadratureRule rule =
+      gauss_legendre_panels(16, -kPi / 2, kPi / 2, {-1.5, -1.2, -0.6, 0, 0.6, 1.2, 1.5});
   Rgbd sum = Rgbd::Zero();
   for (std::size_t i = 0; i < rule.nodes.size(); ++i) {
     const double along = std::sin(rule.nodes[i]);
@@ -63,7 +64,8 @@ Rgbd integrate_sphere(const Mat3d& frame, Function&& f) {
 /// S cos(theta_i) for a fiber with this tangent, all directions in fabric space.
 Rgbd scattered(const FiberScattering& fiber, const Mat3d& frame, const Vec3d& wi, const Vec3d& wo) {
   const Vec3d in = frame.transpose() * wi;
-  return std::sqrt(std::max(0.0, 1 - in.x() * in.x())) * evaluate_bcsdf(fiber, in, frame.transpose() * wo);
+  return std::sqrt(std::max(0.0, 1 - in.x() * in.x())) *
+         evaluate_bcsdf(fiber, in, frame.transpose() * wo);
 }
 
 double relative_difference(const Rgb& a, const Rgbd& b) {
@@ -86,14 +88,15 @@ TEST(WoSpace, IsARotationWithTangentAndViewerInItsPlane) {
 }
 
 TEST(MultipleScatteringLaw, ConstantFieldGivesTheFibersWholeResponse) {
-  // Light 1 from everywhere is sqrt(4 pi) in band 0 alone: the outgoing radiance is the integral of S
-  // cos(theta_i), exactly.
+  // Light 1 from everywhere is sqrt(4 pi) in band 0 alone: the outgoing radiance is the integral of
+  // S cos(theta_i), exactly.
   const FiberScattering fiber = broad_fiber();
   const std::vector<BcsdfTable> materials = {BcsdfTable(fiber)};
   const Transfer transfer = diagonal_transfer(5, {1, 1, 1}, true);
   const MultipleScattering multiple(transfer, materials);
   IncomingField field{};
-  for (int c = 0; c < 3; ++c) field[static_cast<std::size_t>(c)] = static_cast<float>(std::sqrt(4 * kPi));
+  for (int c = 0; c < 3; ++c)
+    field[static_cast<std::size_t>(c)] = static_cast<float>(std::sqrt(4 * kPi));
   for (int i = 0; i < 12; ++i) {
     RandomStream random(2, RandomStage::kTest, 0, static_cast<std::uint64_t>(i));
     const Vec3 tangent = sample_sphere(random);
@@ -101,15 +104,15 @@ TEST(MultipleScatteringLaw, ConstantFieldGivesTheFibersWholeResponse) {
     const Mat3d frame = frame_about(tangent).cast<double>();
     const Rgbd expected = integrate_sphere(
         frame, [&](const Vec3d& wi) { return scattered(fiber, frame, wi, wo.cast<double>()); });
-    // Rows of the table are 180 / 511 degrees apart; linear interpolation of a lobe 12 degrees wide: (0.35 /
-    // 12)^2 / 8 = 1e-4.
+    // Rows of the table are 180 / 511 degrees apart; linear interpolation of a lobe 12 degrees
+    // wide: (0.35 / 12)^2 / 8 = 1e-4.
     EXPECT_LT(relative_difference(multiple.outgoing(field, 0, tangent, wo), expected), 1e-3) << i;
   }
 }
 
 TEST(MultipleScatteringAgreement, RotatedDotProductEqualsQuadratureOfTheTruncatedField) {
-  // An identity matrix hands the light's own expansion on as the incoming field: sum of Y_j(light) Y_j(wi),
-  // in colours.
+  // An identity matrix hands the light's own expansion on as the incoming field: sum of Y_j(light)
+  // Y_j(wi), in colours.
   const FiberScattering fiber = broad_fiber();
   const std::vector<BcsdfTable> materials = {BcsdfTable(fiber)};
   for (const int order : {0, 2, 5}) {
@@ -128,8 +131,8 @@ TEST(MultipleScatteringAgreement, RotatedDotProductEqualsQuadratureOfTheTruncate
         return integrate_sphere(frame, [&](const Vec3d& wi) -> Rgbd {
           std::array<double, sh_count(5)> of_wi;
           evaluate_sh(order, wi, of_wi.data());
-          const double kernel =
-              std::inner_product(of_light.begin(), of_light.begin() + sh_count(order), of_wi.begin(), 0.0);
+          const double kernel = std::inner_product(
+              of_light.begin(), of_light.begin() + sh_count(order), of_wi.begin(), 0.0);
           return std::max(kernel, sign_floor * std::abs(kernel)) * Rgbd(1, 0.5, 0.25) *
                  scattered(fiber, frame, wi, wo.cast<double>());
         });
@@ -139,7 +142,8 @@ TEST(MultipleScatteringAgreement, RotatedDotProductEqualsQuadratureOfTheTruncate
       const Rgb got = multiple.outgoing(arriving.harmonics, 0, tangent, wo);
       // Relative to the response to the positive part: ringing may bring the sum close to 0.
       const double scale = quadrature(0).maxCoeff();
-      EXPECT_LT(((got.cast<double>() - quadrature(-1)) / scale).abs().maxCoeff(), 1e-3) << order << ' ' << i;
+      EXPECT_LT(((got.cast<double>() - quadrature(-1)) / scale).abs().maxCoeff(), 1e-3)
+          << order << ' ' << i;
     }
   }
 }
@@ -157,10 +161,12 @@ TEST(MultipleScatteringAgreement, LightShapeIsTheProjectionOfTheNormalisedGaussi
       const Rgbd expected = integrate_sphere(Mat3d::Identity(), [&](const Vec3d& w) -> Rgbd {
         std::array<double, sh_count(5)> y;
         evaluate_sh(5, w, y.data());
-        return Rgbd::Constant(y[static_cast<std::size_t>(j)] * sg_value({axis.cast<double>(), sharpness}, w) /
+        return Rgbd::Constant(y[static_cast<std::size_t>(j)] *
+                              sg_value({axis.cast<double>(), sharpness}, w) /
                               sg_mass(static_cast<double>(sharpness)));
       });
-      EXPECT_NEAR(field[static_cast<std::size_t>(3 * j)], expected[0], 2e-6) << sharpness << ' ' << j;
+      EXPECT_NEAR(field[static_cast<std::size_t>(3 * j)], expected[0], 2e-6)
+          << sharpness << ' ' << j;
     }
   }
 }
@@ -168,7 +174,8 @@ TEST(MultipleScatteringAgreement, LightShapeIsTheProjectionOfTheNormalisedGaussi
 TEST(MultipleScatteringAgreement, FaceLightIsTheProjectionOfItsMomentsAboveTheHorizon) {
   for (const float sharpness : {0.0F, 2.0F, 30.0F, 150.0F}) {
     const MultipleScattering::LightShape shape(sharpness);
-    for (const Vec3& axis : {Vec3(0.3F, -0.5F, 0.7F), Vec3(-0.9F, 0.2F, 0.05F), Vec3(0.4F, 0.6F, -0.1F), Vec3(0, 0, 1)}) {
+    for (const Vec3& axis : {Vec3(0.3F, -0.5F, 0.7F), Vec3(-0.9F, 0.2F, 0.05F),
+                             Vec3(0.4F, 0.6F, -0.1F), Vec3(0, 0, 1)}) {
       const Vec3 unit = axis.normalized();
       std::array<float, sh_count(5)> got;
       shape.project(5, false, unit, got.data());
@@ -179,11 +186,12 @@ TEST(MultipleScatteringAgreement, FaceLightIsTheProjectionOfItsMomentsAboveTheHo
         const double z = (r + 0.5) / rings;
         for (int a = 0; a < azimuths; ++a) {
           const double phi = 2 * kPi * (a + 0.5) / azimuths;
-          const Vec3d w(std::sqrt(1 - z * z) * std::cos(phi), std::sqrt(1 - z * z) * std::sin(phi), z);
+          const Vec3d w(std::sqrt(1 - z * z) * std::cos(phi), std::sqrt(1 - z * z) * std::sin(phi),
+                        z);
           std::array<double, sh_count(5)> y;
           evaluate_sh(5, w, y.data());
-          const double light = sg_value({unit.cast<double>(), sharpness}, w) / sg_mass(static_cast<double>(sharpness)) *
-                               2 * kPi / rings / azimuths;
+          const double light = sg_value({unit.cast<double>(), sharpness}, w) /
+                               sg_mass(static_cast<double>(sharpness)) * 2 * kPi / rings / azimuths;
           for (int l = 0; l <= 5; ++l) {
             for (int m = -l; m <= l; ++m) {
               const auto j = static_cast<std::size_t>(l * (l + 1) + m);
@@ -193,17 +201,20 @@ TEST(MultipleScatteringAgreement, FaceLightIsTheProjectionOfItsMomentsAboveTheHo
         }
       }
       std::array<float, sh_count(5)> dual;
-      std::transform(expected.begin(), expected.end(), dual.begin(), [](double x) { return static_cast<float>(x); });
+      std::transform(expected.begin(), expected.end(), dual.begin(),
+                     [](double x) { return static_cast<float>(x); });
       HemisphereDual::of_order(5).apply(dual.data());
       for (std::size_t j = 0; j < got.size(); ++j) {
-        EXPECT_NEAR(got[j], dual[j], 0.03) << sharpness << ", axis " << unit.transpose() << ", " << j;
+        EXPECT_NEAR(got[j], dual[j], 0.03)
+            << sharpness << ", axis " << unit.transpose() << ", " << j;
       }
     }
   }
 }
 
-// What it is for: a response that falls to 0 at the horizon is kept for light near the horizon. Response T(w) = w.z over the
-// face (Lambert's law): stored coefficients are its moments; every direction above gets its cosine.
+// What it is for: a response that falls to 0 at the horizon is kept for light near the horizon.
+// Response T(w) = w.z over the face (Lambert's law): stored coefficients are its moments; every
+// direction above gets its cosine.
 TEST(MultipleScatteringLaw, ACosineResponseHoldsDownToTheHorizon) {
   Transfer transfer = diagonal_transfer(5, {0, 0, 0}, false);
   std::array<double, sh_count(5)> stored{};
@@ -212,7 +223,9 @@ TEST(MultipleScatteringLaw, ACosineResponseHoldsDownToTheHorizon) {
       const double z = (r + 0.5) / 2000;
       const double phi = 2 * kPi * (a + 0.5) / 64;
       std::array<double, sh_count(5)> y;
-      evaluate_sh(5, Vec3d(std::sqrt(1 - z * z) * std::cos(phi), std::sqrt(1 - z * z) * std::sin(phi), z), y.data());
+      evaluate_sh(
+          5, Vec3d(std::sqrt(1 - z * z) * std::cos(phi), std::sqrt(1 - z * z) * std::sin(phi), z),
+          y.data());
       for (std::size_t j = 0; j < stored.size(); ++j) stored[j] += z * y[j] * 2 * kPi / 2000 / 64;
     }
   }
@@ -227,18 +240,21 @@ TEST(MultipleScatteringLaw, ACosineResponseHoldsDownToTheHorizon) {
     CellLight arriving;
     const IncomingField& field = arriving.harmonics;
     multiple.incoming(0, directional, Vec3d(std::sin(t), 0, std::cos(t)).cast<float>(), arriving);
-    // What order 5 leaves: 0.01 rms. Taken for 0 below the horizon, the response would be 0.1 off at 70 degrees already.
+    // What order 5 leaves: 0.01 rms. Taken for 0 below the horizon, the response would be 0.1 off
+    // at 70 degrees already.
     EXPECT_NEAR(field[0], std::cos(t), 0.02) << degrees_from_normal;
   }
 }
 
-/// One segment along `tangent`; its cell's cones hold `moments` [width][azimuth] for light from anywhere, in all colours.
+/// One segment along `tangent`; its cell's cones hold `moments` [width][azimuth] for light from
+/// anywhere, in all colours.
 Transfer cone_transfer(const std::vector<float>& moments) {
   Transfer transfer = diagonal_transfer(0, {0, 0, 0}, true);
   transfer.cell_of_segment = {0};
   transfer.cones.emplace();
   transfer.cones->harmonics.assign(3, 0.0F);
-  for (const float moment : moments) transfer.cones->moments.insert(transfer.cones->moments.end(), 3, moment);
+  for (const float moment : moments)
+    transfer.cones->moments.insert(transfer.cones->moments.end(), 3, moment);
   return transfer;
 }
 
@@ -251,10 +267,12 @@ TEST(MultipleScatteringAgreement, LightOnConesEqualsQuadratureOfItsModel) {
     RandomStream random(7, RandomStage::kTest, 0, static_cast<std::uint64_t>(i));
     std::vector<float> moments(ConeTransfer::kWidths * ConeTransfer::kAzimuths);
     for (float& moment : moments) moment = random.uniform() - 0.3F;
-    for (std::size_t d = 0; d < ConeTransfer::kWidths; ++d) moments[d * ConeTransfer::kAzimuths] = 4;
+    for (std::size_t d = 0; d < ConeTransfer::kWidths; ++d)
+      moments[d * ConeTransfer::kAzimuths] = 4;
     const Transfer transfer = cone_transfer(moments);
     const Vec3 tangent = sample_sphere(random);
-    // The bundle a few degrees off the fiber, the light 20 to 50 degrees off the plane across it, the eye near the cone.
+    // The bundle a few degrees off the fiber, the light 20 to 50 degrees off the plane across it,
+    // the eye near the cone.
     const std::vector<Vec3> bundle = {(tangent + 0.05F * sample_sphere(random)).normalized()};
     const MultipleScattering multiple(transfer, materials, bundle);
     const Mat3 frame = cone_frame(bundle[0]);
@@ -262,8 +280,10 @@ TEST(MultipleScatteringAgreement, LightOnConesEqualsQuadratureOfItsModel) {
     const Vec3 light = frame.transpose() * Vec3(std::sin(along), std::cos(along), 0);
     const float turn = 2 * kPif * random.uniform();
     const float out = -along + 0.1F * (random.uniform() - 0.5F);
-    const Vec3 wo = frame.transpose() * Vec3(std::sin(out), std::cos(out) * std::cos(turn), std::cos(out) * std::sin(turn));
-    for (const std::optional<float> sharpness : {std::optional<float>(), std::optional<float>(200.0F)}) {
+    const Vec3 wo = frame.transpose() * Vec3(std::sin(out), std::cos(out) * std::cos(turn),
+                                             std::cos(out) * std::sin(turn));
+    for (const std::optional<float> sharpness :
+         {std::optional<float>(), std::optional<float>(200.0F)}) {
       const MultipleScattering::LightShape shape(sharpness);
       const Rgb got = multiple.radiance(shape, light, 0, 0, tangent, wo);
       const Mat3d axes = frame.transpose().cast<double>();
@@ -273,27 +293,32 @@ TEST(MultipleScatteringAgreement, LightOnConesEqualsQuadratureOfItsModel) {
         const double variance = ConeTransfer::variance_of(d) + (sharpness ? 1.0 / *sharpness : 0.0);
         const double deviation = std::sqrt(variance);
         constexpr int kAzimuths = 200;
-        const QuadratureRule rule =
-            gauss_legendre_panels(16, along - 6 * deviation, std::min(kPi / 2, along + 6 * deviation),
-                                  {along - 3 * deviation, along - deviation, along, along + deviation});
+        const QuadratureRule rule = gauss_legendre_panels(
+            16, along - 6 * deviation, std::min(kPi / 2, along + 6 * deviation),
+            {along - 3 * deviation, along - deviation, along, along + deviation});
         for (std::size_t t = 0; t < rule.nodes.size(); ++t) {
           const double theta = rule.nodes[t];
           const double off = (theta - along) / deviation;
           const double density = std::exp(-0.5 * off * off) / (std::sqrt(2 * kPi) * deviation);
           for (int k = 0; k < kAzimuths; ++k) {
             const double phi = 2 * kPi * k / kAzimuths;
-            const auto values = azimuth_harmonics(static_cast<float>(std::cos(phi)), static_cast<float>(std::sin(phi)));
+            const auto values = azimuth_harmonics(static_cast<float>(std::cos(phi)),
+                                                  static_cast<float>(std::sin(phi)));
             double f = 0;
             for (std::size_t m = 0; m < values.size(); ++m) {
-              f += values[m] * moments[static_cast<std::size_t>(d) * ConeTransfer::kAzimuths + m] * std::sqrt(1 / (4 * kPi));
+              f += values[m] * moments[static_cast<std::size_t>(d) * ConeTransfer::kAzimuths + m] *
+                   std::sqrt(1 / (4 * kPi));
             }
-            const Vec3d w = axes * Vec3d(std::sin(theta), std::cos(theta) * std::cos(phi), std::cos(theta) * std::sin(phi));
-            expected += rule.weights[t] * density * f * (2 * kPi / kAzimuths) * scattered(fiber, own, w, wo.cast<double>());
+            const Vec3d w = axes * Vec3d(std::sin(theta), std::cos(theta) * std::cos(phi),
+                                         std::cos(theta) * std::sin(phi));
+            expected += rule.weights[t] * density * f * (2 * kPi / kAzimuths) *
+                        scattered(fiber, own, w, wo.cast<double>());
           }
         }
       }
-      // Taken at one point are cos / Gn and F over the product of the Gaussians (at most 7 degrees wide), and the turn from the bundle to the fiber:
-      // at these angles a few percent (docs of BcsdfTable::blurred_scatter).
+      // Taken at one point are cos / Gn and F over the product of the Gaussians (at most 7 degrees
+      // wide), and the turn from the bundle to the fiber: at these angles a few percent (docs of
+      // BcsdfTable::blurred_scatter).
       EXPECT_LT(relative_difference(got, expected), 0.05) << i << ' ' << sharpness.value_or(0);
     }
   }
@@ -318,7 +343,8 @@ TEST(MultipleScatteringLaw, SoftAndPrintedLightsLeaveConesInTheHarmonics) {
 TEST(MultipleScattering, PrintedProjectionTakesNoNoticeOfTheHorizon) {
   using LightShape = MultipleScattering::LightShape;
   const Vec3 axis = Vec3(0.5F, -0.3F, 0.4F).normalized();
-  for (const std::optional<float> sharpness : {std::optional<float>(), std::optional<float>(30.0F)}) {
+  for (const std::optional<float> sharpness :
+       {std::optional<float>(), std::optional<float>(30.0F)}) {
     const LightShape printed(sharpness, LightShape::FaceLight::kPrinted);
     const LightShape shipped(sharpness);
     std::array<float, sh_count(5)> face;

@@ -23,7 +23,8 @@ struct World {
   std::vector<BcsdfTable> materials;
   std::vector<Light> lights;
 
-  PathTracer tracer(LightEstimator estimator, bool local = false, int max_scatterings = 4096) const {
+  PathTracer tracer(LightEstimator estimator, bool local = false,
+                    int max_scatterings = 4096) const {
     PathTracerSettings settings;
     settings.estimator = estimator;
     settings.local = local;
@@ -64,8 +65,8 @@ ClothMesh curved_patch() {
   return mesh;
 }
 
-// Mean and standard error of each colour over eye rays onto the middle of the cloth; rays that miss do not
-// count.
+// Mean and standard error of each colour over eye rays onto the middle of the cloth; rays that miss
+// do not count.
 struct Means {
   RunningMean total[3];
   RunningMean single[3];
@@ -74,7 +75,8 @@ Means measure(const PathTracer& tracer, int samples, std::uint64_t seed) {
   Means means;
   for (int k = 0; k < samples; ++k) {
     RandomStream random(seed, RandomStage::kTest, static_cast<std::uint64_t>(k), 0);
-    const Vec3d target(1.5 * random.uniform_double() - 0.75, 1.5 * random.uniform_double() - 0.75, 0);
+    const Vec3d target(1.5 * random.uniform_double() - 0.75, 1.5 * random.uniform_double() - 0.75,
+                       0);
     const Vec3 direction = Vec3(0.3F, 0.2F, -1).normalized();
     const PathTracer::Sample sample =
         tracer.trace({target - 20 * direction.cast<double>(), direction}, random);
@@ -87,33 +89,37 @@ Means measure(const PathTracer& tracer, int samples, std::uint64_t seed) {
   return means;
 }
 
-// Furnace: fibers that scatter everything evenly, in light 1 from everywhere, are invisible. With sampling by
-// the BCSDF every path weighs 1 whatever it hits; shadow rays and the combination judge the geometry of
-// occlusion.
+// Furnace: fibers that scatter everything evenly, in light 1 from everywhere, are invisible. With
+// sampling by the BCSDF every path weighs 1 whatever it hits; shadow rays and the combination judge
+// the geometry of occlusion.
 TEST(PathTracerLaw, Furnace) {
-  const std::vector<Light> light = {sg_light({0, 0, 1}, 0, Rgb(1, 1, 1) * static_cast<float>(4 * kPi))};
+  const std::vector<Light> light = {
+      sg_light({0, 0, 1}, 0, Rgb(1, 1, 1) * static_cast<float>(4 * kPi))};
   for (const bool curved : {false, true}) {
-    const World world =
-        make_world(crossed_layers(white_isotropic()), {curved ? curved_patch() : flat_cloth(6, 6)}, light);
+    const World world = make_world(crossed_layers(white_isotropic()),
+                                   {curved ? curved_patch() : flat_cloth(6, 6)}, light);
     const Means escapes = measure(world.tracer(LightEstimator::kEscapes), 2000, 1);
     EXPECT_NEAR(escapes.total[0].mean(), 1, 1e-4);
     EXPECT_LT(escapes.total[0].standard_error(), 1e-4);
-    for (const LightEstimator estimator : {LightEstimator::kShadowRays, LightEstimator::kCombined}) {
+    for (const LightEstimator estimator :
+         {LightEstimator::kShadowRays, LightEstimator::kCombined}) {
       const Means means = measure(world.tracer(estimator), 20000, 2);
-      EXPECT_TRUE(
-          means_agree(estimator == LightEstimator::kShadowRays ? "furnace, shadow rays" : "furnace, combined",
-                      means.total[0].mean(), means.total[0].standard_error(), 1, 0, 4));
+      EXPECT_TRUE(means_agree(
+          estimator == LightEstimator::kShadowRays ? "furnace, shadow rays" : "furnace, combined",
+          means.total[0].mean(), means.total[0].standard_error(), 1, 0, 4));
     }
     EXPECT_EQ(world.scene->failed_walks(), 0U);
   }
 }
 
-// The same furnace seen with the roulette and the limits of a path that loses its light: breaking either
-// shows.
+// The same furnace seen with the roulette and the limits of a path that loses its light: breaking
+// either shows.
 TEST(PathTracerLaw, FurnaceSeesALostBounce) {
-  const std::vector<Light> light = {sg_light({0, 0, 1}, 0, Rgb(1, 1, 1) * static_cast<float>(4 * kPi))};
+  const std::vector<Light> light = {
+      sg_light({0, 0, 1}, 0, Rgb(1, 1, 1) * static_cast<float>(4 * kPi))};
   const World world = make_world(crossed_layers(white_isotropic()), {flat_cloth(6, 6)}, light);
-  EXPECT_LT(measure(world.tracer(LightEstimator::kCombined, false, 10), 2000, 3).total[0].mean(), 0.99);
+  EXPECT_LT(measure(world.tracer(LightEstimator::kCombined, false, 10), 2000, 3).total[0].mean(),
+            0.99);
 }
 
 TEST(PathTracerStatistical, EstimatorsAgreeUnderASharpGaussian) {
@@ -136,24 +142,26 @@ TEST(PathTracerStatistical, EstimatorsAgreeUnderASharpGaussian) {
 TEST(PathTracerStatistical, AVerySharpGaussianIsADirectionalLight) {
   const Vec3 axis = Vec3(-0.4F, 0.3F, 1).normalized();
   const Rgb irradiance(2, 3, 4);
-  const World sharp =
-      make_world(crossed_layers(test_cotton()), {curved_patch()}, {sg_light(axis, 1e5F, irradiance)});
+  const World sharp = make_world(crossed_layers(test_cotton()), {curved_patch()},
+                                 {sg_light(axis, 1e5F, irradiance)});
   const World directional = make_world(crossed_layers(test_cotton()), {curved_patch()},
                                        {{LightType::kDirectional, axis, 0, irradiance}});
   const Means a = measure(sharp.tracer(LightEstimator::kCombined), 40000, 7);
   const Means b = measure(directional.tracer(LightEstimator::kCombined), 40000, 8);
   for (int c = 0; c < 3; ++c) {
-    EXPECT_TRUE(means_agree("sharp against directional", a.total[c].mean(), a.total[c].standard_error(),
-                            b.total[c].mean(), b.total[c].standard_error(), 3));
+    EXPECT_TRUE(means_agree("sharp against directional", a.total[c].mean(),
+                            a.total[c].standard_error(), b.total[c].mean(),
+                            b.total[c].standard_error(), 3));
   }
 }
 
-// One fiber alone: all its copies are the same fiber, so nothing occludes, and the radiance is an integral
-// over the light.
+// One fiber alone: all its copies are the same fiber, so nothing occludes, and the radiance is an
+// integral over the light.
 TEST(PathTracerStatistical, SingleFiberAgainstQuadrature) {
   const FiberScattering fiber = test_cotton();
   const Light light = sg_light({0.3F, 0.5F, 0.8F}, 20, Rgb(1, 2, 3));
-  // The swatch is turned, so that the fiber's tangent (fabric y) is a general direction of the world.
+  // The swatch is turned, so that the fiber's tangent (fabric y) is a general direction of the
+  // world.
   const Mat3d turn = Eigen::AngleAxisd(0.7, Vec3d(1, 2, 3).normalized()).toRotationMatrix();
   ClothMesh mesh = flat_cloth(10, 10);
   for (Vec3d& p : mesh.positions) p = turn * p;
@@ -172,15 +180,17 @@ TEST(PathTracerStatistical, SingleFiberAgainstQuadrature) {
   constexpr double step = kPi / kPanels;
   for (int row = 0; row < kPanels; ++row) {
     for (int column = 0; column < 2 * kPanels; ++column) {
-      const QuadratureRule thetas = gauss_legendre(5, row * step - kPi / 2, (row + 1) * step - kPi / 2);
+      const QuadratureRule thetas =
+          gauss_legendre(5, row * step - kPi / 2, (row + 1) * step - kPi / 2);
       const QuadratureRule phis = gauss_legendre(5, column * step, (column + 1) * step);
       for (std::size_t i = 0; i < 5; ++i) {
         for (std::size_t j = 0; j < 5; ++j) {
           const double cosine = std::cos(thetas.nodes[i]);
           const Vec3d wi(std::sin(thetas.nodes[i]), cosine * std::cos(phis.nodes[j]),
                          cosine * std::sin(phis.nodes[j]));
-          expected += evaluate_bcsdf(fiber, wi, wo) * (sg_value(gaussian, wi) / sg_mass(20.0) * cosine *
-                                                       cosine * thetas.weights[i] * phis.weights[j]);
+          expected +=
+              evaluate_bcsdf(fiber, wi, wo) * (sg_value(gaussian, wi) / sg_mass(20.0) * cosine *
+                                               cosine * thetas.weights[i] * phis.weights[j]);
         }
       }
     }
@@ -199,7 +209,8 @@ TEST(PathTracerStatistical, SingleFiberAgainstQuadrature) {
       for (int c = 0; c < 3; ++c) means[c].add(static_cast<double>(sample.single[c]));
     }
     for (int c = 0; c < 3; ++c) {
-      EXPECT_TRUE(means_agree("single fiber", means[c].mean(), means[c].standard_error(), expected[c], 0, 9));
+      EXPECT_TRUE(means_agree("single fiber", means[c].mean(), means[c].standard_error(),
+                              expected[c], 0, 9));
     }
   }
 }
@@ -211,14 +222,16 @@ TEST(PathTracer, LocalPathsKeepTheShadowsButNotTheLightOfOtherCloth) {
     wall.positions[k] = Vec3d(-2, p.x(), p.y() + 1.5);
     wall.normals[k] = Vec3d(1, 0, 0);
   }
-  const std::vector<Light> light = {{LightType::kDirectional, Vec3(0.6F, 0, 0.8F), 0, Rgb(1, 1, 1)}};
-  const World with_wall = make_world(crossed_layers(test_cotton()), {flat_cloth(3, 3), wall}, light);
+  const std::vector<Light> light = {
+      {LightType::kDirectional, Vec3(0.6F, 0, 0.8F), 0, Rgb(1, 1, 1)}};
+  const World with_wall =
+      make_world(crossed_layers(test_cotton()), {flat_cloth(3, 3), wall}, light);
   const World alone = make_world(crossed_layers(test_cotton()), {flat_cloth(3, 3)}, light);
   const Means full = measure(with_wall.tracer(LightEstimator::kCombined), 20000, 10);
   const Means local = measure(with_wall.tracer(LightEstimator::kCombined, true), 20000, 10);
   const Means without = measure(alone.tracer(LightEstimator::kCombined, true), 20000, 10);
-  // The lit wall lights the swatch, but not in the local picture: there it could only cast a shadow, and the
-  // light comes from the other side.
+  // The lit wall lights the swatch, but not in the local picture: there it could only cast a
+  // shadow, and the light comes from the other side.
   EXPECT_GT(full.total[0].mean(), local.total[0].mean() + 4 * local.total[0].standard_error());
   EXPECT_EQ(local.total[0].mean(), without.total[0].mean());
 }
@@ -290,8 +303,9 @@ TEST(PathTracerEndToEnd, MoreSamplesMakeThePictureOfAll) {
   EXPECT_TRUE(same(grown.variance, whole.variance));
 }
 
-// What the buffers say of themselves: the halves average to the beauty, single and multiple add up to it, and
-// the two halves differ as much as the variance says (each half has twice the variance of the mean).
+// What the buffers say of themselves: the halves average to the beauty, single and multiple add up
+// to it, and the two halves differ as much as the variance says (each half has twice the variance
+// of the mean).
 TEST(PathTracerStatistical, BuffersAreConsistent) {
   const FrameBuffers frame = small_picture({0, 0, 24, 16}, 64);
   EXPECT_EQ(frame.spp, 64);
@@ -304,12 +318,14 @@ TEST(PathTracerStatistical, BuffersAreConsistent) {
     if (frame.alpha[k] < 1) continue;
     ++lit;
     expected += 4 * static_cast<double>(frame.variance[k][1]);
-    const double difference = static_cast<double>(frame.half0[k][1]) - static_cast<double>(frame.half1[k][1]);
+    const double difference =
+        static_cast<double>(frame.half0[k][1]) - static_cast<double>(frame.half1[k][1]);
     observed += difference * difference;
   }
-  // Each term of the sum is a squared normal: relative standard deviation sqrt(2) if all variances were
-  // equal; they differ, so allow twice the count's standard error times 4.
-  std::printf("  %d pixels: squared difference of halves %.4g, expected %.4g\n", lit, observed, expected);
+  // Each term of the sum is a squared normal: relative standard deviation sqrt(2) if all variances
+  // were equal; they differ, so allow twice the count's standard error times 4.
+  std::printf("  %d pixels: squared difference of halves %.4g, expected %.4g\n", lit, observed,
+              expected);
   EXPECT_GT(lit, 100);
   EXPECT_NEAR(observed / expected, 1, 4 * 2 * std::sqrt(2.0 / lit));
 }
@@ -317,8 +333,9 @@ TEST(PathTracerStatistical, BuffersAreConsistent) {
 TEST(PathTracer, TimedPicturesAreWholePasses) {
   const World world = make_world(crossed_layers(test_cotton()), {curved_patch()},
                                  {{LightType::kDirectional, Vec3(0.6F, 0, 0.8F), 0, Rgb(1, 1, 1)}});
-  const FrameBuffers frame = trace_picture(world.tracer(LightEstimator::kCombined), Camera(small_camera()),
-                                           {0, 0, 24, 16}, 1, {2, 0.05}, [](double) {});
+  const FrameBuffers frame =
+      trace_picture(world.tracer(LightEstimator::kCombined), Camera(small_camera()), {0, 0, 24, 16},
+                    1, {2, 0.05}, [](double) {});
   EXPECT_GE(frame.spp, 2);
   EXPECT_EQ(frame.spp % 2, 0);
 }

@@ -14,7 +14,8 @@
 namespace heddle {
 namespace {
 
-/// Data that hide nothing: every direction is open, and light reaches every fiber once more as it came from the lamp.
+/// Data that hide nothing: every direction is open, and light reaches every fiber once more as it
+/// came from the lamp.
 FabricPack open_pack(const FiberScattering& scattering, bool both_sides = false) {
   FabricPack pack;
   pack.folder = "open.pack";
@@ -68,7 +69,8 @@ FabricPack open_pack(const FiberScattering& scattering, bool both_sides = false)
           offset.x() -= pack.exemplar.width_mm * std::round(offset.x() / pack.exemplar.width_mm);
           offset.y() -= pack.exemplar.height_mm * std::round(offset.y() / pack.exemplar.height_mm);
           const float along = offset.dot(tangent);
-          const float half = 0.125F * (std::abs(tangent.x()) > 0.5F ? pack.exemplar.width_mm : pack.exemplar.height_mm);
+          const float half = 0.125F * (std::abs(tangent.x()) > 0.5F ? pack.exemplar.width_mm
+                                                                    : pack.exemplar.height_mm);
           if (std::abs(along) <= half && (offset - along * tangent).norm() <= 0.0175F)
             id = static_cast<std::int32_t>(s);
         }
@@ -90,7 +92,8 @@ Light gaussian(const Vec3& axis, float sharpness, float irradiance) {
 
 /// Half of the plane z = 1 mm over the cloth: x > 0.
 TriangleMesh half_roof() {
-  return {{Vec3(0, -50, 1), Vec3(50, -50, 1), Vec3(50, 50, 1), Vec3(0, 50, 1)}, {{0, 1, 2}, {0, 2, 3}}};
+  return {{Vec3(0, -50, 1), Vec3(50, -50, 1), Vec3(50, 50, 1), Vec3(0, 50, 1)},
+          {{0, 1, 2}, {0, 2, 3}}};
 }
 
 struct World {
@@ -104,7 +107,8 @@ struct World {
   }
 };
 
-std::unique_ptr<World> make_world(FabricPack pack, std::vector<Light> lights, std::vector<TriangleMesh> meshes = {}) {
+std::unique_ptr<World> make_world(FabricPack pack, std::vector<Light> lights,
+                                  std::vector<TriangleMesh> meshes = {}) {
   auto world = std::make_unique<World>();
   world->pack = std::move(pack);
   std::vector<ClothPiece> pieces;
@@ -115,7 +119,8 @@ std::unique_ptr<World> make_world(FabricPack pack, std::vector<Light> lights, st
   return world;
 }
 
-/// Looks at the cloth from above, from under the roof; `wide` mm of it fill the width of the picture.
+/// Looks at the cloth from above, from under the roof; `wide` mm of it fill the width of the
+/// picture.
 Camera camera_above(double wide, int width, int height) {
   CameraConfig config;
   config.position = Vec3d(0.01, -0.3, 0.9);
@@ -129,10 +134,13 @@ Camera camera_above(double wide, int width, int height) {
 const auto kNoProgress = [](double) {};
 
 TEST(PrecomputedRendererLaw, OpenFurnaceOfWhiteFibersIsOne) {
-  // Light 1 from everywhere (irradiance 4 pi), handed on by an identity: the white isotropic fiber shows 1, in every pixel on
-  // the cloth; nothing is seen by single scattering, whose lobes are all dark.
-  const auto world = make_world(open_pack(white_isotropic(), true), {gaussian({0, 0, 1}, 0, 4 * kPif)});
-  const FrameBuffers frame = shade_picture(world->renderer(), camera_above(1, 24, 16), {0, 0, 24, 16}, 2, kNoProgress);
+  // Light 1 from everywhere (irradiance 4 pi), handed on by an identity: the white isotropic fiber
+  // shows 1, in every pixel on the cloth; nothing is seen by single scattering, whose lobes are all
+  // dark.
+  const auto world =
+      make_world(open_pack(white_isotropic(), true), {gaussian({0, 0, 1}, 0, 4 * kPif)});
+  const FrameBuffers frame =
+      shade_picture(world->renderer(), camera_above(1, 24, 16), {0, 0, 24, 16}, 2, kNoProgress);
   for (std::size_t k = 0; k < frame.pixel_count(); ++k) {
     EXPECT_EQ(frame.single[k].maxCoeff(), 0);
     if (frame.alpha[k] < 1) continue;
@@ -142,13 +150,16 @@ TEST(PrecomputedRendererLaw, OpenFurnaceOfWhiteFibersIsOne) {
 }
 
 TEST(PrecomputedRendererLaw, RivalsShowTheOpenFurnaceAsOne) {
-  // Nothing hides anything in this pack's signed distances, so single scattering of white fibers in light 1 is 1.
-  const auto world = make_world(open_pack(white_isotropic(), true), {gaussian({0, 0, 1}, 0, 4 * kPif)});
-  for (const LocalShading shading : {LocalShading::kPrt, LocalShading::kTsaiShih16, LocalShading::kTsaiShihFull}) {
+  // Nothing hides anything in this pack's signed distances, so single scattering of white fibers in
+  // light 1 is 1.
+  const auto world =
+      make_world(open_pack(white_isotropic(), true), {gaussian({0, 0, 1}, 0, 4 * kPif)});
+  for (const LocalShading shading :
+       {LocalShading::kPrt, LocalShading::kTsaiShih16, LocalShading::kTsaiShihFull}) {
     PrecomputedSettings settings;
     settings.shading = shading;
-    const FrameBuffers frame =
-        shade_picture(world->renderer(settings), camera_above(1, 12, 8), {0, 0, 12, 8}, 1, kNoProgress);
+    const FrameBuffers frame = shade_picture(world->renderer(settings), camera_above(1, 12, 8),
+                                             {0, 0, 12, 8}, 1, kNoProgress);
     for (std::size_t k = 0; k < frame.pixel_count(); ++k) {
       if (frame.alpha[k] < 1) continue;
       EXPECT_LT((frame.single[k] - 1).abs().maxCoeff(), 0.01);  // 1 %: weak lobes left out
@@ -168,14 +179,17 @@ TEST(PrecomputedRenderer, DualScatteringNeedsNothingBaked) {
   const Camera camera = camera_above(0.4, 16, 16);
   PrecomputedSettings settings;
   settings.shading = LocalShading::kDualScattering;
-  const FrameBuffers dual = shade_picture(world->renderer(settings), camera, {0, 0, 16, 16}, 1, kNoProgress);
-  const FrameBuffers open = shade_picture(shipped->renderer(), camera, {0, 0, 16, 16}, 1, kNoProgress);
+  const FrameBuffers dual =
+      shade_picture(world->renderer(settings), camera, {0, 0, 16, 16}, 1, kNoProgress);
+  const FrameBuffers open =
+      shade_picture(shipped->renderer(), camera, {0, 0, 16, 16}, 1, kNoProgress);
   int lit = 0;
   for (std::size_t k = 0; k < dual.pixel_count(); ++k) {
     if (dual.alpha[k] < 1) continue;
     EXPECT_GT(dual.multiple[k].maxCoeff(), 0);
     if (!(dual.single[k].maxCoeff() > 0)) continue;
-    EXPECT_LT((dual.single[k] - open.single[k]).abs().maxCoeff(), 1e-4F * open.single[k].maxCoeff());
+    EXPECT_LT((dual.single[k] - open.single[k]).abs().maxCoeff(),
+              1e-4F * open.single[k].maxCoeff());
     ++lit;
   }
   EXPECT_GT(lit, 50);
@@ -200,7 +214,8 @@ TEST(PrecomputedRenderer, SingleScatteringIsTheBcsdfAtTheFiberSeen) {
       const Vec3 wo = -camera.ray(px, py).direction;
       const Mat3 to_fiber = frame_about(tangent).transpose();
       const Vec3 wi = to_fiber * towards;
-      const Rgb expected = 2 * std::sqrt(1 - wi.x() * wi.x()) * world->pack.materials[0].evaluate(wi, to_fiber * wo);
+      const Rgb expected =
+          2 * std::sqrt(1 - wi.x() * wi.x()) * world->pack.materials[0].evaluate(wi, to_fiber * wo);
       EXPECT_LT(((frame.single[k] - expected) / expected).abs().maxCoeff(), 1e-3);
       ++checked;
     }
@@ -209,16 +224,17 @@ TEST(PrecomputedRenderer, SingleScatteringIsTheBcsdfAtTheFiberSeen) {
 }
 
 TEST(PrecomputedRendererLaw, ShadowOfARoofIsHardInSingleAndGaussianInMultipleScattering) {
-  // The roof's edge is at x = 0 and the light straight above. Share of light at x: a step, and the normal distribution
-  // function Phi(-x / sigma).
-  const auto world = make_world(open_pack(white_isotropic()), {directional({0, 0, 1}, 1)}, {half_roof()});
+  // The roof's edge is at x = 0 and the light straight above. Share of light at x: a step, and the
+  // normal distribution function Phi(-x / sigma).
+  const auto world =
+      make_world(open_pack(white_isotropic()), {directional({0, 0, 1}, 1)}, {half_roof()});
   PrecomputedSettings settings;
   settings.shadow_sigma_mm = 0.1;
-  const FrameBuffers shaded =
-      shade_picture(world->renderer(settings), camera_above(0.8, 32, 24), {0, 0, 32, 24}, 16, kNoProgress);
+  const FrameBuffers shaded = shade_picture(world->renderer(settings), camera_above(0.8, 32, 24),
+                                            {0, 0, 32, 24}, 16, kNoProgress);
   const auto open = make_world(open_pack(white_isotropic()), {directional({0, 0, 1}, 1)});
-  const FrameBuffers lit =
-      shade_picture(open->renderer(settings), camera_above(0.8, 32, 24), {0, 0, 32, 24}, 16, kNoProgress);
+  const FrameBuffers lit = shade_picture(open->renderer(settings), camera_above(0.8, 32, 24),
+                                         {0, 0, 32, 24}, 16, kNoProgress);
   double worst = 0;
   for (int x = 0; x < 32; ++x) {
     double multiple = 0;
@@ -254,7 +270,8 @@ TEST(PrecomputedRenderer, LightFromBelowLeavesClothLitFromTheFaceDark) {
   for (const bool both_sides : {false, true}) {
     for (const Light& light : {directional({0.1F, 0, -1}, 1), gaussian({0.1F, 0, -1}, 500, 1)}) {
       const auto world = make_world(open_pack(test_cotton(), both_sides), {light});
-      const FrameBuffers frame = shade_picture(world->renderer(), camera_above(1, 8, 8), {0, 0, 8, 8}, 2, kNoProgress);
+      const FrameBuffers frame =
+          shade_picture(world->renderer(), camera_above(1, 8, 8), {0, 0, 8, 8}, 2, kNoProgress);
       float brightest = 0;
       for (std::size_t k = 0; k < frame.pixel_count(); ++k) {
         brightest = std::max(brightest, (frame.single[k] + frame.multiple[k]).maxCoeff());
@@ -266,12 +283,14 @@ TEST(PrecomputedRenderer, LightFromBelowLeavesClothLitFromTheFaceDark) {
 
 TEST(PrecomputedRenderer, BackgroundAndAlphaFillWhatTheClothLeaves) {
   const auto world = make_world(open_pack(test_cotton()), {directional({0, 0, 1}, 1)});
-  const FrameBuffers frame = shade_picture(world->renderer(), camera_above(20, 20, 20), {0, 0, 20, 20}, 4, kNoProgress);
+  const FrameBuffers frame =
+      shade_picture(world->renderer(), camera_above(20, 20, 20), {0, 0, 20, 20}, 4, kNoProgress);
   int covered = 0;
   int empty = 0;
   for (std::size_t k = 0; k < frame.pixel_count(); ++k) {
     const Rgb background = (1 - frame.alpha[k]) * Rgb(0.25F, 0.5F, 0.75F);
-    EXPECT_LT((frame.beauty[k] - frame.single[k] - frame.multiple[k] - background).abs().maxCoeff(), 1e-5);
+    EXPECT_LT((frame.beauty[k] - frame.single[k] - frame.multiple[k] - background).abs().maxCoeff(),
+              1e-5);
     EXPECT_LT((frame.beauty[k] - 0.5F * (frame.half0[k] + frame.half1[k])).abs().maxCoeff(), 1e-5);
     covered += frame.alpha[k] == 1;
     empty += frame.alpha[k] == 0;
@@ -293,7 +312,9 @@ TEST(PrecomputedRenderer, ALowerOrderIsThatOfDataCutToIt) {
   const auto shown = [](const World& world, std::optional<int> order) {
     const PrecomputedSettings settings{
         .shadow_sigma_mm = {}, .blend = {}, .transfer_order = order, .interactive = {}};
-    return shade_picture(world.renderer(settings), camera_above(1, 8, 8), {0, 0, 8, 8}, 2, kNoProgress).multiple;
+    return shade_picture(world.renderer(settings), camera_above(1, 8, 8), {0, 0, 8, 8}, 2,
+                         kNoProgress)
+        .multiple;
   };
   const auto whole = make_world(pack, lights);
   pack.transfer = cut_to_order(*pack.transfer, 1);
@@ -314,18 +335,22 @@ TEST(PrecomputedRendererAgreement, VolumeSeesWhatFibersShow) {
   PrecomputedSettings settings;
   settings.volume = true;
   const Camera camera = camera_above(0.5, 48, 48);
-  const FrameBuffers fibers = shade_picture(world->renderer(), camera, {0, 0, 48, 48}, 1, kNoProgress);
-  const FrameBuffers volume = shade_picture(world->renderer(settings), camera, {0, 0, 48, 48}, 1, kNoProgress);
+  const FrameBuffers fibers =
+      shade_picture(world->renderer(), camera, {0, 0, 48, 48}, 1, kNoProgress);
+  const FrameBuffers volume =
+      shade_picture(world->renderer(settings), camera, {0, 0, 48, 48}, 1, kNoProgress);
   int both = 0;
   int same_fiber = 0;
   int near = 0;
   for (std::size_t k = 0; k < fibers.pixel_count(); ++k) {
     if (fibers.segment[k] == 0xffffffffU || volume.segment[k] == 0xffffffffU) continue;
     ++both;
-    if (world->pack.exemplar.segment_fiber[fibers.segment[k]] != world->pack.exemplar.segment_fiber[volume.segment[k]])
+    if (world->pack.exemplar.segment_fiber[fibers.segment[k]] !=
+        world->pack.exemplar.segment_fiber[volume.segment[k]])
       continue;
     ++same_fiber;
-    // Two edges of a voxel (5 um); near the silhouette a ray may pass the last voxel centre and meet the fiber's next copy.
+    // Two edges of a voxel (5 um); near the silhouette a ray may pass the last voxel centre and
+    // meet the fiber's next copy.
     near += std::abs(fibers.depth[k] - volume.depth[k]) < 0.01;
   }
   EXPECT_GT(both, 48 * 48 / 2);
@@ -334,20 +359,23 @@ TEST(PrecomputedRendererAgreement, VolumeSeesWhatFibersShow) {
 }
 
 TEST(PrecomputedRendererEndToEnd, MoreSamplesMakeThePictureOfAll) {
-  const auto world = make_world(open_pack(test_cotton()),
-                                {directional({0.3F, 0.2F, 1}, 1), gaussian({-0.5F, 0, 1}, 150, 2)}, {half_roof()});
+  const auto world =
+      make_world(open_pack(test_cotton()),
+                 {directional({0.3F, 0.2F, 1}, 1), gaussian({-0.5F, 0, 1}, 150, 2)}, {half_roof()});
   const Camera camera = camera_above(2, 20, 20);
-  const FrameBuffers whole = shade_picture(world->renderer(), camera, {0, 0, 20, 20}, 13, kNoProgress);
+  const FrameBuffers whole =
+      shade_picture(world->renderer(), camera, {0, 0, 20, 20}, 13, kNoProgress);
   std::vector<int> seen;
-  const FrameBuffers grown =
-      shade_picture(world->renderer(), camera, {0, 0, 20, 20}, 3, kNoProgress, [&](const FrameBuffers& frame) {
-        seen.push_back(frame.spp);
-        return 13 - frame.spp;
-      });
+  const FrameBuffers grown = shade_picture(world->renderer(), camera, {0, 0, 20, 20}, 3,
+                                           kNoProgress, [&](const FrameBuffers& frame) {
+                                             seen.push_back(frame.spp);
+                                             return 13 - frame.spp;
+                                           });
   EXPECT_EQ(seen, (std::vector<int>{3, 13}));
   EXPECT_EQ(grown.spp, 13);
   for (std::size_t k = 0; k < whole.pixel_count(); ++k) {
-    ASSERT_TRUE((grown.beauty[k] == whole.beauty[k]).all() && (grown.half0[k] == whole.half0[k]).all());
+    ASSERT_TRUE((grown.beauty[k] == whole.beauty[k]).all() &&
+                (grown.half0[k] == whole.half0[k]).all());
     ASSERT_TRUE((grown.variance[k] == whole.variance[k]).all());
     ASSERT_EQ(grown.segment[k], whole.segment[k]);
     ASSERT_EQ(grown.depth[k], whole.depth[k]);
@@ -355,8 +383,9 @@ TEST(PrecomputedRendererEndToEnd, MoreSamplesMakeThePictureOfAll) {
 }
 
 TEST(PrecomputedRendererEndToEnd, SameBytesForAnyThreadsAndCrop) {
-  const auto world = make_world(open_pack(test_cotton()),
-                                {directional({0.3F, 0.2F, 1}, 1), gaussian({-0.5F, 0, 1}, 150, 2)}, {half_roof()});
+  const auto world =
+      make_world(open_pack(test_cotton()),
+                 {directional({0.3F, 0.2F, 1}, 1), gaussian({-0.5F, 0, 1}, 150, 2)}, {half_roof()});
   const Camera camera = camera_above(2, 50, 40);
   const auto render = [&](std::size_t threads, const PixelRect& crop) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
@@ -366,7 +395,8 @@ TEST(PrecomputedRendererEndToEnd, SameBytesForAnyThreadsAndCrop) {
   const FrameBuffers two = render(2, {0, 0, 50, 40});
   const FrameBuffers crop = render(2, {13, 7, 30, 21});
   for (std::size_t k = 0; k < one.pixel_count(); ++k) {
-    ASSERT_TRUE((one.beauty[k] == two.beauty[k]).all() && (one.multiple[k] == two.multiple[k]).all());
+    ASSERT_TRUE((one.beauty[k] == two.beauty[k]).all() &&
+                (one.multiple[k] == two.multiple[k]).all());
     ASSERT_EQ(one.segment[k], two.segment[k]);
   }
   for (int y = 0; y < 21; ++y) {

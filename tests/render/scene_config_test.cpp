@@ -140,11 +140,13 @@ TEST_F(SceneConfigTest, ViewsAndReferences) {
   EXPECT_TRUE(scene.views[1].reference->local);
   EXPECT_EQ(read(kScene + with(kView, "spp = 8\n", "")).views[1].spp, 64) << "that of [render]";
 
-  EXPECT_NE(message(kScene + with(kView, "close-up", "close/up")).find("file name"), std::string::npos);
+  EXPECT_NE(message(kScene + with(kView, "close-up", "close/up")).find("file name"),
+            std::string::npos);
   EXPECT_NE(message(kScene + with(kView, "close-up", "..")).find("file name"), std::string::npos);
   EXPECT_NE(message(kScene + kView + kView).find("no other view"), std::string::npos);
   EXPECT_NE(message(kScene + with(kView, "spp = 8", "spp = 7")).find("even"), std::string::npos);
-  EXPECT_NE(message(kScene + with(kView, "[300, 0]", "[301, 0]")).find("inside"), std::string::npos);
+  EXPECT_NE(message(kScene + with(kView, "[300, 0]", "[301, 0]")).find("inside"),
+            std::string::npos);
   EXPECT_NE(message(kScene + with(kView, "spp = 256", "spp = 3")).find("even"), std::string::npos);
 }
 
@@ -174,13 +176,16 @@ TEST_F(SceneConfigTest, MistakesAreLocated) {
       {"fabric = \"silk.toml\"", "surface = \"silk.toml\"", "model"},
       {"fabric = \"silk.toml\"", "surface = \"wool.toml\"", "wool.toml"},
       {"fabric = \"silk.toml\"", "surface = \"velvet\"", "underlay"},
-      {"fabric = \"silk.toml\"", "surface = \"velvet\"\nsurface_method = \"fast\"", "one of \"sampled\", \"interactive\""},
+      {"fabric = \"silk.toml\"", "surface = \"velvet\"\nsurface_method = \"fast\"",
+       "one of \"sampled\", \"interactive\""},
       {"fabric = \"silk.toml\"", "surface = \"irawan-denim\"\nsurface_method = \"interactive\"",
        "irawan-denim has no interactive form"},
       {"fabric = \"silk.toml\"", "surface = \"irawan-denim\"\nsurface_method = \"interactive\"",
        "silk-crepe-de-chine, silk-shot, velvet"},
-      {"fabric = \"silk.toml\"", "fabric = \"silk.toml\"\nsurface_method = \"interactive\"", "surface_method"},
-      {"fabric = \"silk.toml\"", "fabric = \"silk.toml\"\nsurface = \"velvet\"", "either fabric or surface"},
+      {"fabric = \"silk.toml\"", "fabric = \"silk.toml\"\nsurface_method = \"interactive\"",
+       "surface_method"},
+      {"fabric = \"silk.toml\"", "fabric = \"silk.toml\"\nsurface = \"velvet\"",
+       "either fabric or surface"},
       {"fabric = \"silk.toml\"\n", "", "either fabric or surface"},
       {"spp = 64", "spp = 63", "even"},
       {"name = \"test\"", "name = \"test\"\nnmae = 3", "nmae"},
@@ -221,16 +226,19 @@ TEST_F(SceneConfigTest, ASurfaceStandsInForAFabric) {
   EXPECT_EQ(cloth("surface = \"own.toml\"\n").surface->text, of_velvet);
   std::ofstream(folder_ / "own.toml") << with(text, "ior = 1.", "ior = 1.1");
   EXPECT_NE(cloth("surface = \"own.toml\"\n").surface->text, of_velvet);
-  std::ofstream(folder_ / "own.toml") << with(text, "model = \"microcylinder\"", "model = \"felt\"");
-  EXPECT_NE(message(with(kScene, flat, "[[cloth]]\nflat_mm = [30, 20]\nsurface = \"own.toml\"\n")).find("own.toml:"),
+  std::ofstream(folder_ / "own.toml")
+      << with(text, "model = \"microcylinder\"", "model = \"felt\"");
+  EXPECT_NE(message(with(kScene, flat, "[[cloth]]\nflat_mm = [30, 20]\nsurface = \"own.toml\"\n"))
+                .find("own.toml:"),
             std::string::npos);
 }
 
 TEST_F(SceneConfigTest, ASceneNeedsLightAndCloth) {
-  EXPECT_NE(message("name = \"a\"\n" + kScene.substr(kScene.find("[camera]"),
-                                                     kScene.find("[[light]]") - kScene.find("[camera]")))
-                .find("[[light]]"),
-            std::string::npos);
+  EXPECT_NE(
+      message("name = \"a\"\n" + kScene.substr(kScene.find("[camera]"),
+                                               kScene.find("[[light]]") - kScene.find("[camera]")))
+          .find("[[light]]"),
+      std::string::npos);
 }
 
 TEST(SceneConfig, MethodNamesRoundTrip) {

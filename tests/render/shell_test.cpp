@@ -46,8 +46,8 @@ TEST(Shell, FlatSwatchIsTheIdentity) {
   EXPECT_NEAR(sum, 10 * 6 * 0.5, 1e-9);
 }
 
-// Invariants of every shell: neighbours point at each other across the same three vertices, and what is left
-// over is a surface on which every edge belongs to an even number of faces.
+// Invariants of every shell: neighbours point at each other across the same three vertices, and
+// what is left over is a surface on which every edge belongs to an even number of faces.
 void expect_conforming(const Shell& shell) {
   for (std::uint32_t tet = 0; tet < shell.tets().size(); ++tet) {
     for (std::uint32_t face = 0; face < 4; ++face) {
@@ -73,15 +73,19 @@ TEST(Shell, DrapeIsConformingAndOpenOnlyAtItsOutside) {
   for (const char* name : {"drape_sphere_64", "drape_table_64"}) {
     const Shell shell(drape(name), -0.15, 0.15);
     expect_conforming(shell);
-    // 64 x 64 quads: top and bottom of 8192 triangles, and two triangles for each of the 256 outer edges.
+    // 64 x 64 quads: top and bottom of 8192 triangles, and two triangles for each of the 256 outer
+    // edges.
     EXPECT_EQ(shell.tets().size(), 3 * 8192U);
     EXPECT_EQ(shell.boundary_faces().size(), 2 * 8192 + 2 * 256U);
     EXPECT_EQ(shell.degenerate_count(), 0U);
-    std::printf("  %s: %u of %zu tetrahedra flipped\n", name, shell.flipped_count(), shell.tets().size());
-    // Surface area from the meshes' own description: 0.0888 and 0.0899 m^2; the thickness is measured along
-    // vertex normals, so the volume falls short where faces lean in the folds: by 7 % and 2 %.
+    std::printf("  %s: %u of %zu tetrahedra flipped\n", name, shell.flipped_count(),
+                shell.tets().size());
+    // Surface area from the meshes' own description: 0.0888 and 0.0899 m^2; the thickness is
+    // measured along vertex normals, so the volume falls short where faces lean in the folds: by 7
+    // % and 2 %.
     double sum = 0;
-    for (std::uint32_t tet = 0; tet < shell.tets().size(); ++tet) sum += std::max(0.0, volume(shell, tet));
+    for (std::uint32_t tet = 0; tet < shell.tets().size(); ++tet)
+      sum += std::max(0.0, volume(shell, tet));
     EXPECT_GT(sum, 0.92 * 0.0888e6 * 0.3);
     EXPECT_LT(sum, 1.001 * 0.0900e6 * 0.3);
   }
@@ -102,7 +106,8 @@ TEST(Shell, WindingAgainstTheNormalsIsNotFlipped) {
   EXPECT_GT(intervals, 0);
 }
 
-// Two triangles that share an edge in space: one sheet where the UVs agree, two with a rim where they do not.
+// Two triangles that share an edge in space: one sheet where the UVs agree, two with a rim where
+// they do not.
 ObjMesh two_triangles(bool seam) {
   ObjMesh obj;
   obj.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 0, 0}, {1, 1, 1}, {0, 1, 0}};
@@ -141,13 +146,16 @@ TEST(Shell, MeshWithoutUvsIsRefused) {
   EXPECT_THROW(cloth_mesh_of(obj, "a.obj", 1, 1), FileError);
 }
 
-// Length of the ray inside one tetrahedron by clipping against its four planes: the oracle of the walk.
-double clipped_length(const Shell& shell, std::uint32_t tet, const Vec3d& origin, const Vec3d& direction) {
+// Length of the ray inside one tetrahedron by clipping against its four planes: the oracle of the
+// walk.
+double clipped_length(const Shell& shell, std::uint32_t tet, const Vec3d& origin,
+                      const Vec3d& direction) {
   double t0 = 0;
   double t1 = 1e30;
   for (std::uint32_t face = 0; face < 4; ++face) {
     const auto v = shell.face_vertices(tet, face);
-    const Vec3d normal = (shell.world(v[1]) - shell.world(v[0])).cross(shell.world(v[2]) - shell.world(v[0]));
+    const Vec3d normal =
+        (shell.world(v[1]) - shell.world(v[0])).cross(shell.world(v[2]) - shell.world(v[0]));
     const double distance = normal.dot(shell.world(v[0]) - origin);
     const double speed = normal.dot(direction);
     if (speed == 0) {
@@ -161,9 +169,9 @@ double clipped_length(const Shell& shell, std::uint32_t tet, const Vec3d& origin
   return std::max(0.0, t1 - t0);
 }
 
-// The walks from all faces that the ray enters by cover exactly the tetrahedra that the ray meets, the
-// intervals of a walk join up in world and fabric space, and each end has the fabric position that the affine
-// map gives it.
+// The walks from all faces that the ray enters by cover exactly the tetrahedra that the ray meets,
+// the intervals of a walk join up in world and fabric space, and each end has the fabric position
+// that the affine map gives it.
 TEST(ShellAgreement, WalksCoverWhatClippingFinds) {
   const Shell shell(drape("drape_sphere_64"), -0.15, 0.15);
   const TriangleScene boundary({shell.boundary_mesh()});
@@ -180,8 +188,8 @@ TEST(ShellAgreement, WalksCoverWhatClippingFinds) {
       double end = 0;
       Vec3d fabric_end = Vec3d::Zero();
       bool is_first = true;
-      const auto result =
-          shell.walk_from_face(origin, direction, crossing.triangle, [&](const ShellInterval& piece) {
+      const auto result = shell.walk_from_face(
+          origin, direction, crossing.triangle, [&](const ShellInterval& piece) {
             if (!is_first) {
               // A gap can only be a flipped tetrahedron, which goes backwards.
               EXPECT_LE(piece.t0, end + 1e-9);
@@ -192,9 +200,10 @@ TEST(ShellAgreement, WalksCoverWhatClippingFinds) {
             is_first = false;
             end = piece.t1;
             fabric_end = piece.fabric1;
-            const Vec3d mapped =
-                (shell.fabric_from_world(piece.tet).cast<double>() * direction) * (piece.t1 - piece.t0);
-            EXPECT_LT((mapped - (piece.fabric1 - piece.fabric0)).norm(), 1e-5 * mapped.norm() + 1e-9);
+            const Vec3d mapped = (shell.fabric_from_world(piece.tet).cast<double>() * direction) *
+                                 (piece.t1 - piece.t0);
+            EXPECT_LT((mapped - (piece.fabric1 - piece.fabric0)).norm(),
+                      1e-5 * mapped.norm() + 1e-9);
             walked += piece.t1 - piece.t0;
             ++intervals;
             return false;
@@ -205,7 +214,8 @@ TEST(ShellAgreement, WalksCoverWhatClippingFinds) {
     for (std::uint32_t tet = 0; tet < shell.tets().size(); ++tet) {
       if (volume(shell, tet) > 0) clipped += clipped_length(shell, tet, origin, direction);
     }
-    // The direction of the walk is exact; the entry faces are found in float, good to 1e-4 mm sideways.
+    // The direction of the walk is exact; the entry faces are found in float, good to 1e-4 mm
+    // sideways.
     EXPECT_NEAR(walked, clipped, 1e-2);
   }
   EXPECT_GT(intervals, 1000);
@@ -232,7 +242,8 @@ TEST(ShellAgreement, AWalkFromInsideContinuesAWalkFromOutside) {
       const double middle = 0.5 * (first.t0 + first.t1);
       std::vector<ShellInterval> rest;
       shell.walk_from_inside(origin + middle * direction, direction, first.tet,
-                             0.5 * (first.fabric0 + first.fabric1), [&](const ShellInterval& piece) {
+                             0.5 * (first.fabric0 + first.fabric1),
+                             [&](const ShellInterval& piece) {
                                rest.push_back(piece);
                                return false;
                              });
@@ -264,7 +275,8 @@ TEST(Shell, FindTriangleWalksAcrossADrape) {
   const Shell shell(drape("drape_sphere_64"), -0.15, 0.15);
   RandomStream random(3, RandomStage::kTest, 0, 0);
   for (int k = 0; k < 200; ++k) {
-    const Eigen::Vector2d xy(kDrapeUvMm * random.uniform_double(), kDrapeUvMm * random.uniform_double());
+    const Eigen::Vector2d xy(kDrapeUvMm * random.uniform_double(),
+                             kDrapeUvMm * random.uniform_double());
     const auto a = shell.find_triangle(0, xy);
     const auto b = shell.find_triangle(8191, xy);
     ASSERT_TRUE(a && b);
@@ -280,14 +292,14 @@ TEST(Shell, FindTriangleWalksAcrossADrape) {
   }
 }
 
-// A sheet folded back on itself within its thickness, a triangle without area, and a mesh of random corners:
-// rays end, every number is finite, and the counts say what is wrong.
+// A sheet folded back on itself within its thickness, a triangle without area, and a mesh of random
+// corners: rays end, every number is finite, and the counts say what is wrong.
 TEST(ShellStability, FoldsAndDegenerateTetrahedra) {
   ClothMesh fold;
   for (int row = 0; row < 3; ++row) {
     for (const double x : {0.0, 4.0}) {
-      // Rows at y = 0, 2 and back to 0.02, 0.05 higher: the last strip lies upside down, 0.05 over a 0.4
-      // thick cloth.
+      // Rows at y = 0, 2 and back to 0.02, 0.05 higher: the last strip lies upside down, 0.05 over
+      // a 0.4 thick cloth.
       fold.positions.emplace_back(x, row == 1 ? 2.0 : 0.02 * row, row == 2 ? 0.05 : 0.0);
       fold.normals.emplace_back(0, 0, 1);
       fold.fabric.emplace_back(x, 2.0 * row);
@@ -306,7 +318,8 @@ TEST(ShellStability, FoldsAndDegenerateTetrahedra) {
   }
   for (std::uint32_t t = 0; t < 100; ++t) {
     const std::uint32_t a = random.index(40);
-    noise.triangles.push_back({a, (a + 1 + random.index(19)) % 40, (a + 20 + random.index(20)) % 40});
+    noise.triangles.push_back(
+        {a, (a + 1 + random.index(19)) % 40, (a + 20 + random.index(20)) % 40});
   }
   EXPECT_EQ(Shell(fold, -0.2, 0.2).flipped_count(), 6U);
   EXPECT_EQ(Shell(line, -0.2, 0.2).degenerate_count(), 6U);

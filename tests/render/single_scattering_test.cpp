@@ -24,7 +24,8 @@ FiberScattering broad_fiber() {
   return fiber;
 }
 
-/// Two segments with the same signed distance d(direction) on the map's pixels; segment 1 sees nothing.
+/// Two segments with the same signed distance d(direction) on the map's pixels; segment 1 sees
+/// nothing.
 SsdfVisibility make_ssdf(const std::function<double(const Vec3d&)>& distance) {
   SsdfVisibility ssdf;
   ssdf.components = 1;
@@ -33,8 +34,8 @@ SsdfVisibility make_ssdf(const std::function<double(const Vec3d&)>& distance) {
     for (int column = 0; column < n; ++column) {
       const double theta = kPi * (row + 0.5) / n;
       const double phi = 2 * kPi * (column + 0.5) / n;
-      ssdf.mean.push_back(static_cast<float>(distance(
-          Vec3d(std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta)))));
+      ssdf.mean.push_back(static_cast<float>(distance(Vec3d(
+          std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta)))));
       ssdf.basis.push_back(0);
     }
   }
@@ -76,7 +77,8 @@ Rgbd scattered(const FiberScattering& fiber, const Vec3& tangent, const Vec3d& w
 }
 
 /// Integral over the sphere by a product rule about `axis`, finer near it.
-Rgbd integrate_about(const Vec3& axis, double sharpness, const std::function<Rgbd(const Vec3d&)>& f) {
+Rgbd integrate_about(const Vec3& axis, double sharpness,
+                     const std::function<Rgbd(const Vec3d&)>& f) {
   constexpr int kAzimuths = 192;
   std::vector<double> breaks;
   append_geometric_breaks(0, 0.5 / std::sqrt(sharpness + 1), kPi, breaks);
@@ -87,8 +89,8 @@ Rgbd integrate_about(const Vec3& axis, double sharpness, const std::function<Rgb
     const double theta = rule.nodes[i];
     for (int k = 0; k < kAzimuths; ++k) {
       const double phi = 2 * kPi * (k + 0.5) / kAzimuths;
-      const Vec3d w =
-          frame * Vec3d(std::cos(theta), std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi));
+      const Vec3d w = frame * Vec3d(std::cos(theta), std::sin(theta) * std::cos(phi),
+                                    std::sin(theta) * std::sin(phi));
       sum += rule.weights[i] * std::sin(theta) * 2 * kPi / kAzimuths * f(w);
     }
   }
@@ -112,8 +114,10 @@ TEST(SingleScattering, DirectionalLightIsTheBcsdfWhereTheDistanceIsPositive) {
       continue;
     }
     ++lit;
-    const Rgbd expected = scattered(fiber, point.tangent.world, light.cast<double>(), point.wo.world);
-    EXPECT_LT((got.cast<double>() - expected).abs().maxCoeff(), 2e-4 * (expected.maxCoeff() + 1e-3)) << i;
+    const Rgbd expected =
+        scattered(fiber, point.tangent.world, light.cast<double>(), point.wo.world);
+    EXPECT_LT((got.cast<double>() - expected).abs().maxCoeff(), 2e-4 * (expected.maxCoeff() + 1e-3))
+        << i;
     ShadingPoint dark = point;
     dark.segment = 1;
     EXPECT_EQ(single.directional(dark, {light, light}).maxCoeff(), 0);
@@ -138,7 +142,8 @@ TEST(SingleScatteringAgreement, SoftLightIsTheQuadratureOfLobesTimesLightTimesBc
   const std::vector<BcsdfTable> materials = {BcsdfTable(fiber)};
   const SgVisibility lobes = make_lobes();
   const SingleScattering single(nullptr, &lobes, materials, kLobesOnly);
-  const Mat3d turn = Eigen::AngleAxisd(float_from_half(lobes.rotation[0]), Vec3d::UnitZ()).toRotationMatrix();
+  const Mat3d turn =
+      Eigen::AngleAxisd(float_from_half(lobes.rotation[0]), Vec3d::UnitZ()).toRotationMatrix();
   const auto visibility = [&](const Vec3d& w) {
     double sum = 0;
     for (int q = 0; q < lobes.lobes(); ++q) {
@@ -171,8 +176,8 @@ TEST(SingleScatteringAgreement, SoftLightIsTheQuadratureOfLobesTimesLightTimesBc
       dark.segment = 1;
       EXPECT_EQ(single.spherical_gaussian(dark, {axis, axis}, sharpness).maxCoeff(), 0);
     }
-    // The products have sharpness 40 and more: Gamma is within 2 % there (sg_scatter.h), the lobes left out
-    // hold less.
+    // The products have sharpness 40 and more: Gamma is within 2 % there (sg_scatter.h), the lobes
+    // left out hold less.
     EXPECT_LT(difference / total, 0.02) << sharpness;
     EXPECT_GT(total, 0.01);
   }
@@ -186,7 +191,8 @@ FiberScattering narrow_fiber() {
   return fiber;
 }
 
-/// Mean |error| over mean value, at lights within 1.4 deviations of the edge of the upper half-space, seen near their specular cones.
+/// Mean |error| over mean value, at lights within 1.4 deviations of the edge of the upper
+/// half-space, seen near their specular cones.
 double error_over_an_edge(const FiberScattering& fiber, float sharpness, SgMethod gamma) {
   const std::vector<BcsdfTable> materials = {BcsdfTable(fiber)};
   const SsdfVisibility ssdf = make_ssdf(upper_half_space);
@@ -194,20 +200,25 @@ double error_over_an_edge(const FiberScattering& fiber, float sharpness, SgMetho
   double difference = 0;
   double total = 0;
   for (int i = 0; i < 24; ++i) {
-    RandomStream random(4, RandomStage::kTest, static_cast<std::uint64_t>(sharpness), static_cast<std::uint64_t>(i));
-    const float height = (random.uniform() - 0.3F) * 2 / std::sqrt(sharpness);  // in deviations of the light
+    RandomStream random(4, RandomStage::kTest, static_cast<std::uint64_t>(sharpness),
+                        static_cast<std::uint64_t>(i));
+    // in deviations of the light
+    const float height = (random.uniform() - 0.3F) * 2 / std::sqrt(sharpness);
     const float azimuth = 2 * kPif * random.uniform();
     const Vec3 axis = Vec3(std::cos(azimuth), std::sin(azimuth), height).normalized();
     const Vec3 tangent = sample_sphere(random);
     const double reach = std::hypot(fiber.beta_r, 1 / std::sqrt(sharpness));
-    const double theta = std::clamp(-std::asin(static_cast<double>(axis.dot(tangent))) + (2.0 * random.uniform() - 1) * reach, -1.5, 1.5);
-    const Vec3 wo = frame_about(tangent) * vector_from({theta, 2 * kPi * random.uniform()}).cast<float>();
+    const double theta = std::clamp(
+        -std::asin(static_cast<double>(axis.dot(tangent))) + (2.0 * random.uniform() - 1) * reach,
+        -1.5, 1.5);
+    const Vec3 wo =
+        frame_about(tangent) * vector_from({theta, 2 * kPi * random.uniform()}).cast<float>();
     const ShadingPoint point = {0, 0, 0, {tangent, tangent}, {wo, wo}};
     const Rgb got = single.spherical_gaussian(point, {axis, axis}, sharpness);
     const Rgbd expected = integrate_about(axis, sharpness, [&](const Vec3d& wi) -> Rgbd {
       if (wi.z() <= 0) return Rgbd::Zero();
-      return sg_value({axis.cast<double>(), sharpness}, wi) / sg_mass(static_cast<double>(sharpness)) *
-             scattered(fiber, tangent, wi, wo);
+      return sg_value({axis.cast<double>(), sharpness}, wi) /
+             sg_mass(static_cast<double>(sharpness)) * scattered(fiber, tangent, wi, wo);
     });
     difference += (got.cast<double>() - expected).abs().sum();
     total += expected.sum();
@@ -216,14 +227,17 @@ double error_over_an_edge(const FiberScattering& fiber, float sharpness, SgMetho
 }
 
 TEST(SingleScatteringAgreement, LightOverAnEdgeIsCloseToQuadrature) {
-  std::printf("  sharpness: broad fiber, narrow fiber; in brackets looked up at the light's axis\n");
+  std::printf(
+      "  sharpness: broad fiber, narrow fiber; in brackets looked up at the light's axis\n");
   for (const float sharpness : {10.0F, 30.0F, 100.0F, 300.0F, 2000.0F}) {
     const double broad = error_over_an_edge(broad_fiber(), sharpness, SgMethod::kDefault);
     const double narrow = error_over_an_edge(narrow_fiber(), sharpness, SgMethod::kDefault);
     const double axis_broad = error_over_an_edge(broad_fiber(), sharpness, SgMethod::kPrinted);
     const double axis_narrow = error_over_an_edge(narrow_fiber(), sharpness, SgMethod::kPrinted);
-    std::printf("  %5g: %.3f (%.3f), %.3f (%.3f)\n", static_cast<double>(sharpness), broad, axis_broad, narrow, axis_narrow);
-    // What is left is the product's shape, taken as Gaussian; a lookup at the axis errs by up to .34.
+    std::printf("  %5g: %.3f (%.3f), %.3f (%.3f)\n", static_cast<double>(sharpness), broad,
+                axis_broad, narrow, axis_narrow);
+    // What is left is the product's shape, taken as Gaussian; a lookup at the axis errs by up to
+    // .34.
     EXPECT_LT(broad, 0.06) << sharpness;
     EXPECT_LT(narrow, 0.04) << sharpness;
     EXPECT_LT(narrow, 0.5 * axis_narrow) << sharpness;
@@ -240,7 +254,8 @@ TEST(SingleScattering, SharpLightDoesNotDependOnHowTheClothLiesInSpace) {
     RandomStream random(11, RandomStage::kTest, 0, static_cast<std::uint64_t>(i));
     ShadingPoint point = random_point(random);
     const float azimuth = 2 * kPif * random.uniform();
-    const Vec3 axis = Vec3(std::cos(azimuth), std::sin(azimuth), random.uniform() - 0.3F).normalized();
+    const Vec3 axis =
+        Vec3(std::cos(azimuth), std::sin(azimuth), random.uniform() - 0.3F).normalized();
     const Mat3 turn = frame_about(sample_sphere(random));
     const Rgb flat = single.spherical_gaussian(point, {axis, axis}, 40);
     point.tangent.world = turn * point.tangent.fabric;
@@ -262,11 +277,13 @@ TEST(SingleScattering, GammaIsThePrintedOneWhereAsked) {
     const ShadingPoint point = random_point(random);
     const Vec3 axis = sample_sphere(random);
     const Mat3 to_fiber = frame_about(point.tangent.world).transpose();
-    const Rgbd expected = sg_scatter(fiber, {(to_fiber * axis).cast<double>(), 300}, (to_fiber * point.wo.world).cast<double>(),
-                                     SgMethod::kPrinted) /
-                          sg_mass(300.0);
+    const Rgbd expected =
+        sg_scatter(fiber, {(to_fiber * axis).cast<double>(), 300},
+                   (to_fiber * point.wo.world).cast<double>(), SgMethod::kPrinted) /
+        sg_mass(300.0);
     const Rgb value = printed.spherical_gaussian(point, {axis, axis}, 300);
-    EXPECT_LT((value.cast<double>() - expected).abs().maxCoeff(), 1e-4 * expected.maxCoeff() + 1e-6);
+    EXPECT_LT((value.cast<double>() - expected).abs().maxCoeff(),
+              1e-4 * expected.maxCoeff() + 1e-6);
   }
 }
 
@@ -283,7 +300,8 @@ TEST(SingleScattering, BlendsLinearlyBetweenTheTwoRepresentations) {
   const DirectionPair axis = {w, w};
   for (const float sharpness : {5.0F, 10.0F, 12.5F, 19.0F, 20.0F, 1000.0F}) {
     const float share = std::clamp((sharpness - 10) / 10, 0.0F, 1.0F);
-    const Rgb both = SingleScattering(&open, &lobes, materials).spherical_gaussian(point, axis, sharpness);
+    const Rgb both =
+        SingleScattering(&open, &lobes, materials).spherical_gaussian(point, axis, sharpness);
     const Rgb only_sharp =
         SingleScattering(&open, &dark, materials).spherical_gaussian(point, axis, sharpness);
     const Rgb only_soft =
@@ -294,7 +312,8 @@ TEST(SingleScattering, BlendsLinearlyBetweenTheTwoRepresentations) {
     // Gamma / M of the open sphere, times the share.
     const Mat3 to_fiber = frame_about(point.tangent.world).transpose();
     const Rgb unoccluded =
-        materials[0].sg_scatter(to_fiber * w, sharpness, to_fiber * point.wo.world) / sg_mass(sharpness);
+        materials[0].sg_scatter(to_fiber * w, sharpness, to_fiber * point.wo.world) /
+        sg_mass(sharpness);
     EXPECT_LT((only_sharp - share * unoccluded).abs().maxCoeff(), 1e-5 * unoccluded.maxCoeff());
   }
 }

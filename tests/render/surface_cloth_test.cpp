@@ -33,20 +33,28 @@ class FunctionModel final : public SurfaceModel {
   Rgbd reflected(const SurfacePoint& point, const Vec3d& wi, const Vec3d& wo) const override {
     return wi.z() > 0 && wo.z() > 0 ? function_(point, wi, wo) : Rgbd::Zero();
   }
-  Rgbd reflected_sg(const SurfacePoint&, const Vec3d&, double, const Vec3d&) const override { return Rgbd::Zero(); }
-  std::optional<SurfaceSample> sample(const SurfacePoint& point, const Vec3& wo, RandomStream& random) const override {
+  Rgbd reflected_sg(const SurfacePoint&, const Vec3d&, double, const Vec3d&) const override {
+    return Rgbd::Zero();
+  }
+  std::optional<SurfaceSample> sample(const SurfacePoint& point, const Vec3& wo,
+                                      RandomStream& random) const override {
     const Vec3 wi = sample_hemisphere({0, 0, 1}, random);
     const float density = 0.5F / kPif;
-    return SurfaceSample{wi, reflected(point, wi.cast<double>(), wo.cast<double>()).cast<float>() / density, density};
+    return SurfaceSample{
+        wi, reflected(point, wi.cast<double>(), wo.cast<double>()).cast<float>() / density,
+        density};
   }
-  float pdf(const SurfacePoint&, const Vec3& wi, const Vec3&) const override { return wi.z() > 0 ? 0.5F / kPif : 0; }
+  float pdf(const SurfacePoint&, const Vec3& wi, const Vec3&) const override {
+    return wi.z() > 0 ? 0.5F / kPif : 0;
+  }
 
  private:
   Function function_;
 };
 
 Model constant_model() {
-  return std::make_shared<FunctionModel>([](const auto&, const auto&, const auto&) { return Rgbd(1, 0.5, 0.25); });
+  return std::make_shared<FunctionModel>(
+      [](const auto&, const auto&, const auto&) { return Rgbd(1, 0.5, 0.25); });
 }
 
 Light directional(const Vec3& axis, const Rgb& irradiance = Rgb(1, 2, 3)) {
@@ -69,7 +77,8 @@ ClothMesh mapped(const Eigen::Matrix2d& map) {
   return mesh;
 }
 
-/// A quarter of a tube of radius 2 about the x axis, its middle on top at z = 0; u along the axis, v around it.
+/// A quarter of a tube of radius 2 about the x axis, its middle on top at z = 0; u along the axis,
+/// v around it.
 ClothMesh arch(int steps) {
   ClothMesh mesh;
   for (int i = 0; i <= steps; ++i) {
@@ -101,10 +110,11 @@ struct World {
   PrecomputedRenderer renderer() const { return {*scene, {}, lights, Rgb(0, 0, 0), {}}; }
 };
 
-World make_world(std::vector<ClothPiece> fibers, std::vector<TriangleMesh> black, std::vector<SurfaceCloth> surfaces,
-                 std::vector<Light> lights) {
+World make_world(std::vector<ClothPiece> fibers, std::vector<TriangleMesh> black,
+                 std::vector<SurfaceCloth> surfaces, std::vector<Light> lights) {
   World world;
-  world.scene = std::make_unique<ClothScene>(std::move(fibers), std::move(black), std::move(surfaces));
+  world.scene =
+      std::make_unique<ClothScene>(std::move(fibers), std::move(black), std::move(surfaces));
   world.materials = scene_materials(*world.scene);
   world.lights = std::move(lights);
   return world;
@@ -140,11 +150,13 @@ TEST(SurfaceClothLaw, AFlatPatchUnderADirectionalLightIsTheModel) {
       RandomStream random(1, RandomStage::kTest, 0, 0);
       const EyeSample sample = world.tracer().trace(ray, random);
       const Rgb expected =
-          light.irradiance *
-          model->reflected({Vec2(0.3F, -0.7F), 0}, light.axis.cast<double>(), -ray.direction.cast<double>())
-              .cast<float>();
+          light.irradiance * model
+                                 ->reflected({Vec2(0.3F, -0.7F), 0}, light.axis.cast<double>(),
+                                             -ray.direction.cast<double>())
+                                 .cast<float>();
       EXPECT_GT(expected.minCoeff(), 0);
-      EXPECT_TRUE((sample.single == expected).all()) << name << ": " << (sample.single / expected).transpose();
+      EXPECT_TRUE((sample.single == expected).all())
+          << name << ": " << (sample.single / expected).transpose();
       EXPECT_TRUE((sample.multiple == 0).all());
       EXPECT_EQ(sample.alpha, 1);
     }
@@ -152,7 +164,8 @@ TEST(SurfaceClothLaw, AFlatPatchUnderADirectionalLightIsTheModel) {
 }
 
 TEST(SurfaceClothStatistical, EstimatorsAgreeWithEachOtherAndWithTheLightsIntegral) {
-  // Sharp and soft light; silk has narrow lobes. 3 x 3 means against the model's own integral, and against each other.
+  // Sharp and soft light; silk has narrow lobes. 3 x 3 means against the model's own integral, and
+  // against each other.
   constexpr int kSamples = 20000;
   constexpr double kCubature = 2e-3;  // of the largest channel: what the integral may be off by
   int tests = 0;
@@ -162,17 +175,19 @@ TEST(SurfaceClothStatistical, EstimatorsAgreeWithEachOtherAndWithTheLightsIntegr
       const Light light = gaussian({0.5F, 0.1F, 1}, sharpness, Rgb(1, 1, 1));
       const World world = surface_world(model, flat_cloth(4, 4), {light});
       const EyeRay ray = ray_to({0, 0, 0}, {-0.4F, 0.3F, 1});
-      const Rgbd exact =
-          model->reflected_sg({}, light.axis.cast<double>(), light.sharpness, -ray.direction.cast<double>());
+      const Rgbd exact = model->reflected_sg({}, light.axis.cast<double>(), light.sharpness,
+                                             -ray.direction.cast<double>());
       for (const LightEstimator estimator :
            {LightEstimator::kShadowRays, LightEstimator::kEscapes, LightEstimator::kCombined}) {
         const PathTracer tracer = world.tracer(estimator);
         RunningMean mean;
         for (int k = 0; k < kSamples; ++k) {
-          RandomStream random(7, RandomStage::kTest, static_cast<std::uint64_t>(tests), static_cast<std::uint64_t>(k));
+          RandomStream random(7, RandomStage::kTest, static_cast<std::uint64_t>(tests),
+                              static_cast<std::uint64_t>(k));
           mean.add(static_cast<double>(tracer.trace(ray, random).single[1]));
         }
-        EXPECT_TRUE(means_agree(name, mean.mean(), std::hypot(mean.standard_error(), kCubature * exact.maxCoeff() / 3),
+        EXPECT_TRUE(means_agree(name, mean.mean(),
+                                std::hypot(mean.standard_error(), kCubature * exact.maxCoeff() / 3),
                                 exact[1], 0, 12));
         EXPECT_LT(mean.standard_error(), 0.07 * exact[1]);
         ++tests;
@@ -184,7 +199,10 @@ TEST(SurfaceClothStatistical, EstimatorsAgreeWithEachOtherAndWithTheLightsIntegr
 TEST(SurfaceCloth, EscapesAloneNeverMeetADirectionalLight) {
   const World world = surface_world(constant_model(), flat_cloth(4, 4), {directional({0, 0, 1})});
   RandomStream random(1, RandomStage::kTest, 0, 0);
-  EXPECT_TRUE((world.tracer(LightEstimator::kEscapes).trace(ray_to({0, 0, 0}, {0, 0, 1}), random).single == 0).all());
+  EXPECT_TRUE(
+      (world.tracer(LightEstimator::kEscapes).trace(ray_to({0, 0, 0}, {0, 0, 1}), random).single ==
+       0)
+          .all());
 }
 
 /// The frame and the point that a ray sees on a mesh.
@@ -234,28 +252,33 @@ TEST(SurfaceCloth, ShearedUvsLeaveTheFrameOrthonormal) {
 
 TEST(SurfaceCloth, UvsWithoutAreaStillGiveAFrame) {
   const SurfaceHit hit = seen(mapped(Eigen::Matrix2d::Zero()), {0.5, 0.25, 0}, {0, 0, 1});
-  EXPECT_LT((hit.world_from_patch.transpose() * hit.world_from_patch - Mat3d::Identity()).norm(), 1e-6);
+  EXPECT_LT((hit.world_from_patch.transpose() * hit.world_from_patch - Mat3d::Identity()).norm(),
+            1e-6);
   EXPECT_NEAR(hit.world_from_patch.determinant(), 1, 1e-6);
 }
 
 TEST(SurfaceCloth, CurvedClothHasInterpolatedNormals) {
-  // Between two vertices of 8 degrees, the frame is off the true one by what linear interpolation leaves.
+  // Between two vertices of 8 degrees, the frame is off the true one by what linear interpolation
+  // leaves.
   for (const double y : {0.0, 0.3, -0.9}) {
     const double angle = std::asin(y / 2);
     const Vec3d target(0.3, y, 2 * std::cos(angle) - 2);
     const SurfaceHit hit = seen(arch(11), target, {0, 0, 1});
-    EXPECT_LT((hit.world_from_patch.col(2) - Vec3d(0, std::sin(angle), std::cos(angle))).norm(), 2e-3);
+    EXPECT_LT((hit.world_from_patch.col(2) - Vec3d(0, std::sin(angle), std::cos(angle))).norm(),
+              2e-3);
     EXPECT_LT((hit.world_from_patch.col(0) - Vec3d(1, 0, 0)).norm(), 1e-9);
     EXPECT_NEAR(hit.point.position_mm.y(), 2 * angle, 0.01);
   }
 }
 
 TEST(SurfaceCloth, NoBlackRimWhereNormalsTurnAwayFromTheEye) {
-  // Four steps of 22.5 degrees; the last one rises 33.75 degrees to an eye 38 degrees high, its rim's normal falls to it.
+  // Four steps of 22.5 degrees; the last one rises 33.75 degrees to an eye 38 degrees high, its
+  // rim's normal falls to it.
   const double last = radians(33.75);
   const Vec3d middle(0.1, 2 * std::cos(radians(11.25)) * std::sin(last),
                      2 * std::cos(radians(11.25)) * std::cos(last) - 2);
-  const Vec3 from(0, -static_cast<float>(std::cos(radians(38))), static_cast<float>(std::sin(radians(38))));
+  const Vec3 from(0, -static_cast<float>(std::cos(radians(38))),
+                  static_cast<float>(std::sin(radians(38))));
   const World world = surface_world(constant_model(), arch(4), {directional(from)});
   int bent = 0;
   for (int k = -9; k < 10; ++k) {
@@ -275,19 +298,26 @@ TEST(SurfaceCloth, NoBlackRimWhereNormalsTurnAwayFromTheEye) {
 }
 
 TEST(SurfaceCloth, TheBackShowsTheModelUnderLightFromBelow) {
-  const World world = surface_world(constant_model(), flat_cloth(4, 4),
-                                    {directional({0, 0.2F, 1}), directional({0.1F, 0, -1}, Rgb(7, 7, 7))});
+  const World world =
+      surface_world(constant_model(), flat_cloth(4, 4),
+                    {directional({0, 0.2F, 1}), directional({0.1F, 0, -1}, Rgb(7, 7, 7))});
   RandomStream random(1, RandomStage::kTest, 0, 0);
-  EXPECT_TRUE((world.tracer().trace(ray_to({0.3, 0, 0}, {0, 0, 1}), random).single == Rgb(1, 1, 0.75F)).all());
-  EXPECT_TRUE((world.tracer().trace(ray_to({0.3, 0, 0}, {0, 0, -1}), random).single == Rgb(7, 3.5F, 1.75F)).all());
+  EXPECT_TRUE(
+      (world.tracer().trace(ray_to({0.3, 0, 0}, {0, 0, 1}), random).single == Rgb(1, 1, 0.75F))
+          .all());
+  EXPECT_TRUE(
+      (world.tracer().trace(ray_to({0.3, 0, 0}, {0, 0, -1}), random).single == Rgb(7, 3.5F, 1.75F))
+          .all());
 }
 
 TEST(SurfaceCloth, ThePixelsFootprintAndPlaceReachTheModel) {
-  const auto report = std::make_shared<FunctionModel>([](const SurfacePoint& point, const Vec3d&, const Vec3d&) {
+  const auto report = std::make_shared<FunctionModel>([](const SurfacePoint& point, const Vec3d&,
+                                                         const Vec3d&) {
     return Rgbd(static_cast<double>(point.footprint_mm), static_cast<double>(point.position_mm.x()),
                 static_cast<double>(point.position_mm.y()));
   });
-  const World world = surface_world(report, flat_cloth(40, 40), {directional({0, 0, 1}, Rgb(1, 1, 1))});
+  const World world =
+      surface_world(report, flat_cloth(40, 40), {directional({0, 0, 1}, Rgb(1, 1, 1))});
   const Camera camera = camera_from({0, 0, 60}, 6, 12);  // 0.5 mm per pixel, 60 mm away
   RandomStream random(1, RandomStage::kTest, 0, 0);
   for (const double x : {1.3, 9.5}) {
@@ -301,8 +331,8 @@ TEST(SurfaceCloth, ThePixelsFootprintAndPlaceReachTheModel) {
 TEST(SurfaceCloth, LayersOfAPicture) {
   const Light light = directional({0.2F, 0, 1});
   const World world = surface_world(constant_model(), flat_cloth(4, 4), {light});
-  const FrameBuffers frame =
-      shade_picture(world.renderer(), camera_from({0, 0, 60}, 8, 16), {0, 0, 16, 16}, 2, kNoProgress);
+  const FrameBuffers frame = shade_picture(world.renderer(), camera_from({0, 0, 60}, 8, 16),
+                                           {0, 0, 16, 16}, 2, kNoProgress);
   int covered = 0;
   for (std::size_t k = 0; k < frame.pixel_count(); ++k) {
     EXPECT_EQ(frame.segment[k], 0xffffffffU);
@@ -320,13 +350,15 @@ TEST(SurfaceCloth, LayersOfAPicture) {
 }
 
 TEST(SurfaceCloth, MeshesAndSurfacesShadowASurface) {
-  TriangleMesh roof{{Vec3(0, -5, 1), Vec3(5, -5, 1), Vec3(5, 5, 1), Vec3(0, 5, 1)}, {{0, 1, 2}, {0, 2, 3}}};
+  TriangleMesh roof{{Vec3(0, -5, 1), Vec3(5, -5, 1), Vec3(5, 5, 1), Vec3(0, 5, 1)},
+                    {{0, 1, 2}, {0, 2, 3}}};
   const Light light = directional({0, 0, 1});
-  const World mesh = make_world({}, {roof}, {SurfaceCloth(constant_model(), flat_cloth(4, 4))}, {light});
-  const World surface = make_world(
-      {}, {},
-      {SurfaceCloth(constant_model(), lifted(flat_cloth(1, 1), 1)), SurfaceCloth(constant_model(), flat_cloth(4, 4))},
-      {light});
+  const World mesh =
+      make_world({}, {roof}, {SurfaceCloth(constant_model(), flat_cloth(4, 4))}, {light});
+  const World surface = make_world({}, {},
+                                   {SurfaceCloth(constant_model(), lifted(flat_cloth(1, 1), 1)),
+                                    SurfaceCloth(constant_model(), flat_cloth(4, 4))},
+                                   {light});
   const auto lit = [](const World& world, double x) {
     RandomStream random(1, RandomStage::kTest, 0, 0);
     return world.tracer().trace(ray_to({x, 0, 0}, {-1, 0, 0.3F}), random).single[0];
@@ -338,10 +370,12 @@ TEST(SurfaceCloth, MeshesAndSurfacesShadowASurface) {
 }
 
 TEST(SurfaceCloth, ARoofTakesAllOfAGaussianLight) {
-  const TriangleMesh roof{{Vec3(-9e3F, -9e3F, 1), Vec3(9e3F, -9e3F, 1), Vec3(0, 9e3F, 1)}, {{0, 1, 2}}};
+  const TriangleMesh roof{{Vec3(-9e3F, -9e3F, 1), Vec3(9e3F, -9e3F, 1), Vec3(0, 9e3F, 1)},
+                          {{0, 1, 2}}};
   for (const bool covered : {false, true}) {
-    const World world = make_world({}, covered ? std::vector{roof} : std::vector<TriangleMesh>{},
-                                   {SurfaceCloth(constant_model(), flat_cloth(4, 4))}, {gaussian({0, 0, 1}, 8)});
+    const World world =
+        make_world({}, covered ? std::vector{roof} : std::vector<TriangleMesh>{},
+                   {SurfaceCloth(constant_model(), flat_cloth(4, 4))}, {gaussian({0, 0, 1}, 8)});
     for (const LightEstimator estimator :
          {LightEstimator::kShadowRays, LightEstimator::kEscapes, LightEstimator::kCombined}) {
       float sum = 0;
@@ -355,11 +389,12 @@ TEST(SurfaceCloth, ARoofTakesAllOfAGaussianLight) {
 }
 
 TEST(SurfaceCloth, FibersShadowASurface) {
-  // Fibers of radius 0.05 over x = -0.5 and 0.5. Traced fibers shade what lies under them; as a solid the shell shades all.
+  // Fibers of radius 0.05 over x = -0.5 and 0.5. Traced fibers shade what lies under them; as a
+  // solid the shell shades all.
   const auto sparse = std::make_shared<TileScene>(single_fiber(test_cotton()));
-  const World world =
-      make_world({{sparse, lifted(flat_cloth(2, 2), 1)}}, {}, {SurfaceCloth(constant_model(), flat_cloth(8, 8))},
-                 {directional({0, 0, 1}, Rgb(1, 1, 1))});
+  const World world = make_world({{sparse, lifted(flat_cloth(2, 2), 1)}}, {},
+                                 {SurfaceCloth(constant_model(), flat_cloth(8, 8))},
+                                 {directional({0, 0, 1}, Rgb(1, 1, 1))});
   const PathTracer tracer = world.tracer();
   for (int k = -35; k < 36; ++k) {
     RandomStream random(1, RandomStage::kTest, 0, 0);
@@ -378,8 +413,8 @@ TEST(SurfaceCloth, ASurfaceShadowsFibersAndTheNearerHidesTheOther) {
   // The surface hangs over x > 0 of the fibers.
   ClothMesh half = lifted(flat_cloth(4, 4), 1);
   for (Vec3d& position : half.positions) position.x() += 2;
-  const World world =
-      make_world({{tile, flat_cloth(6, 4)}}, {}, {SurfaceCloth(constant_model(), half)}, {directional({0, 0, 1})});
+  const World world = make_world({{tile, flat_cloth(6, 4)}}, {},
+                                 {SurfaceCloth(constant_model(), half)}, {directional({0, 0, 1})});
   const PathTracer tracer = world.tracer();
   const auto mean = [&](double x, const Vec3& from) {
     RunningMean total;
@@ -393,13 +428,14 @@ TEST(SurfaceCloth, ASurfaceShadowsFibersAndTheNearerHidesTheOther) {
   };
   const Vec3 under(-1, 0, 0.2F);
   EXPECT_GT(mean(-1, under), 0.01);
-  EXPECT_EQ(mean(1.2, under), 0) << "straight light does not reach these fibers, and nothing else shines";
+  EXPECT_EQ(mean(1.2, under), 0)
+      << "straight light does not reach these fibers, and nothing else shines";
   EXPECT_EQ(mean(1.2, {0, 0, 1}), 1) << "from above: the surface (0.5 of 2), not the fibers";
 }
 
 TEST(SurfaceClothEndToEnd, SameBytesForAnyThreadsAndCrop) {
-  const World world =
-      surface_world(preset("silk-shot"), arch(12), {directional({0.3F, 0.2F, 1}), gaussian({-0.5F, 0, 1}, 150)});
+  const World world = surface_world(preset("silk-shot"), arch(12),
+                                    {directional({0.3F, 0.2F, 1}), gaussian({-0.5F, 0, 1}, 150)});
   const Camera camera = camera_from({0, 2, 6}, 5, 32);
   const auto pictures = [&](std::size_t threads, const PixelRect& crop) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
@@ -410,8 +446,8 @@ TEST(SurfaceClothEndToEnd, SameBytesForAnyThreadsAndCrop) {
   const auto two = pictures(2, {0, 0, 32, 32});
   const auto crop = pictures(2, {5, 9, 20, 11});
   double light = 0;
-  for (const auto picture :
-       {&std::pair<FrameBuffers, FrameBuffers>::first, &std::pair<FrameBuffers, FrameBuffers>::second}) {
+  for (const auto picture : {&std::pair<FrameBuffers, FrameBuffers>::first,
+                             &std::pair<FrameBuffers, FrameBuffers>::second}) {
     for (std::size_t k = 0; k < (one.*picture).pixel_count(); ++k) {
       ASSERT_TRUE(((one.*picture).beauty[k] == (two.*picture).beauty[k]).all());
       light += static_cast<double>((one.*picture).beauty[k].sum());

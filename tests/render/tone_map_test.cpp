@@ -6,7 +6,8 @@ namespace heddle {
 namespace {
 
 TEST(ToneMap, KnownValuesOfTheStandard) {
-  // 255 (1.055 * 0.2^(1 / 2.4) - 0.055) = 123.6; 0.003 lies on the straight part: 255 * 12.92 * 0.003 = 9.9.
+  // 255 (1.055 * 0.2^(1 / 2.4) - 0.055) = 123.6; 0.003 lies on the straight part: 255 * 12.92 *
+  // 0.003 = 9.9.
   const std::vector<std::uint8_t> bytes = tone_map({{0, 1, 0.2F}, {0.003F, 7, -1}}, 0);
   EXPECT_EQ(bytes, (std::vector<std::uint8_t>{0, 255, 124, 10, 255, 0}));
 }

@@ -29,7 +29,8 @@ TEST(TriangleScene, SaysWhereOnTheMeshesAHitLies) {
     EXPECT_EQ(hit->mesh, 1U);
     const auto& corner = meshes[1].triangles[hit->triangle];
     const auto& p = meshes[1].positions;
-    const Vec3 point = (1 - hit->u - hit->v) * p[corner[0]] + hit->u * p[corner[1]] + hit->v * p[corner[2]];
+    const Vec3 point =
+        (1 - hit->u - hit->v) * p[corner[0]] + hit->u * p[corner[1]] + hit->v * p[corner[2]];
     EXPECT_LT((point - target).norm(), 1e-6F);
   }
 }

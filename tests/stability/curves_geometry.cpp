@@ -16,13 +16,15 @@ Curve shell_curve(Effort) {
               .is_log = false,
               .drivers = {0.1, 0.3, 0.5, 0.7, 0.9, 1.0, 1.1, 1.3, 1.6, 2, 3},
               .series = {{"flipped", {}}, {"share of the folds that curves too tightly", {}}},
-              .warning_from = 1.0};  // kHiddenTetShare is passed with the first folds that are too tight
-  constexpr double kHalf = 0.1;      // mm
+              // kHiddenTetShare is passed with the first folds that are too tight
+              .warning_from = 1.0};
+  constexpr double kHalf = 0.1;  // mm
   for (const double ratio : curve.drivers) {
     const FoldedMesh fold(kHalf / ratio);
     const Shell shell(fold.mesh(), -kHalf, kHalf);
-    curve.series[0].values.push_back(static_cast<double>(shell.flipped_count() + shell.degenerate_count()) /
-                                     static_cast<double>(shell.tets().size()));
+    curve.series[0].values.push_back(
+        static_cast<double>(shell.flipped_count() + shell.degenerate_count()) /
+        static_cast<double>(shell.tets().size()));
     curve.series[1].values.push_back(fold.share_tighter_than(kHalf));
   }
   return curve;

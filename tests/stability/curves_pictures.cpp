@@ -1,4 +1,5 @@
-// Curves of whole pictures: small fabrics through all stages, rendered, against path-traced pictures of the same eye rays.
+// Curves of whole pictures: small fabrics through all stages, rendered, against path-traced
+// pictures of the same eye rays.
 
 #include <algorithm>
 #include <array>
@@ -50,7 +51,8 @@ std::vector<bool> chosen_pixels(const Image& picture, Choose&& choose) {
   const std::vector<std::uint32_t>& segment = picture.channels.at("segment").ids;
   std::vector<bool> chosen(u.size());
   for (std::size_t k = 0; k < u.size(); ++k) {
-    chosen[k] = segment[k] != 0xffffffffU && choose(static_cast<double>(u[k]), static_cast<double>(v[k]));
+    chosen[k] =
+        segment[k] != 0xffffffffU && choose(static_cast<double>(u[k]), static_cast<double>(v[k]));
   }
   return chosen;
 }
@@ -70,7 +72,8 @@ Curve ringing_curve(Effort effort) {
   for (const double sharpness : curve.drivers) {
     SmallScene scene;
     scene.wide_mm = 1;
-    scene.light = sharpness < 1e6 ? gaussian(inclined(80, 20), sharpness) : directional(inclined(80, 20));
+    scene.light =
+        sharpness < 1e6 ? gaussian(inclined(80, 20), sharpness) : directional(inclined(80, 20));
     const PictureResult fast = pipeline.picture(scene, RenderMethod::kExact, 64);
     const PictureResult truth = pipeline.picture(scene, RenderMethod::kPath, 64);
     double negative = 0;
@@ -82,7 +85,8 @@ Curve ringing_curve(Effort effort) {
       }
     }
     curve.series[0].values.push_back(negative / all);
-    curve.series[1].values.push_back(std::abs(mean_of(fast.image, "multiple") / mean_of(truth.image, "multiple") - 1));
+    curve.series[1].values.push_back(
+        std::abs(mean_of(fast.image, "multiple") / mean_of(truth.image, "multiple") - 1));
   }
   return curve;
 }
@@ -108,12 +112,14 @@ Curve cells_curve(Effort effort) {
   const int spp = effort == Effort::kFull ? 256 : 128;
   const PictureResult truth = pipeline.picture(scene, RenderMethod::kPath, spp);
   for (const double factor : factors) {
-    const SceneVariant variant{.order = {}, .fabric = {.cell_size = factor}, .blend = {}, .surface_method = {}};
+    const SceneVariant variant{
+        .order = {}, .fabric = {.cell_size = factor}, .blend = {}, .surface_method = {}};
     const PictureResult fast = pipeline.picture(scene, RenderMethod::kExact, spp, true, variant);
     const FabricPack pack = pipeline.pack(variant.fabric);
     curve.drivers.push_back(pack_facts(pack, TileScene(pack.exemplar)).cell_mean_free_paths);
     curve.series[0].values.push_back(relative_error(fast.image, truth.image));
-    curve.series[1].values.push_back(std::abs(mean_of(fast.image, "") / mean_of(truth.image, "") - 1));
+    curve.series[1].values.push_back(
+        std::abs(mean_of(fast.image, "") / mean_of(truth.image, "") - 1));
   }
   return curve;
 }
@@ -174,12 +180,14 @@ Curve rim_curve(Effort effort) {
   const std::array<std::array<std::vector<Rgb>, 2>, 2> values = {
       {{layer_of(picture(RenderMethod::kPath, 2 * rim), "", "picture"),
         layer_of(picture(RenderMethod::kPath, 40), "", "picture")},
-       {layer_of(fast, "", "picture"), layer_of(picture(RenderMethod::kExact, 40), "", "picture")}}};
+       {layer_of(fast, "", "picture"),
+        layer_of(picture(RenderMethod::kExact, 40), "", "picture")}}};
   const double thickness = 2 * fabric.height_mm;
   std::vector<double> kept;
   for (std::size_t d = 0; d < curve.drivers.size(); ++d) {
     const double low = d == 0 ? 0 : 0.5 * (curve.drivers[d - 1] + curve.drivers[d]);
-    const double high = d + 1 == curve.drivers.size() ? 6 : 0.5 * (curve.drivers[d] + curve.drivers[d + 1]);
+    const double high =
+        d + 1 == curve.drivers.size() ? 6 : 0.5 * (curve.drivers[d] + curve.drivers[d + 1]);
     const auto chosen = chosen_pixels(fast, [&](double u, double) {
       const double distance = (rim - u) / thickness;
       return distance >= low && distance < high;
@@ -200,15 +208,16 @@ Curve rim_curve(Effort effort) {
 }
 
 Curve behind_curve(Effort effort) {
-  Curve curve{.title = "Thin cloth lit from behind",
-              .driver = "light from the normal, degrees",
-              .measure = "|mean - reference| / reference at 60 degrees",
-              .is_log = false,
-              .drivers = effort == Effort::kFull
-                             ? std::vector<double>{60, 0, 30, 75, 85, 89, 91, 95, 105, 120, 150, 180}
-                             : std::vector<double>{60, 91, 120, 180},
-              .series = {{"data for light from the face", {}}, {"data for light from both sides", {}}},
-              .warning_from = 90.0};
+  Curve curve{
+      .title = "Thin cloth lit from behind",
+      .driver = "light from the normal, degrees",
+      .measure = "|mean - reference| / reference at 60 degrees",
+      .is_log = false,
+      .drivers = effort == Effort::kFull
+                     ? std::vector<double>{60, 0, 30, 75, 85, 89, 91, 95, 105, 120, 150, 180}
+                     : std::vector<double>{60, 91, 120, 180},
+      .series = {{"data for light from the face", {}}, {"data for light from both sides", {}}},
+      .warning_from = 90.0};
   for (const bool both : {false, true}) {
     SmallFabric fabric;
     fabric.light_from = both ? "both" : "face";
@@ -232,8 +241,9 @@ Curve grazing_curve(Effort effort) {
               .driver = "view from the normal, degrees",
               .measure = "relative RMSE of pixels; |mean / reference - 1|",
               .is_log = false,
-              .drivers = effort == Effort::kFull ? std::vector<double>{0, 20, 40, 60, 70, 75, 80, 85, 87, 88.5, 89.5}
-                                                 : std::vector<double>{40, 80, 89.5},
+              .drivers = effort == Effort::kFull
+                             ? std::vector<double>{0, 20, 40, 60, 70, 75, 80, 85, 87, 88.5, 89.5}
+                             : std::vector<double>{40, 80, 89.5},
               .series = {{"RMSE of pixels", {}}, {"mean", {}}},
               .warning_from = kGrazingDegrees};
   SmallPipeline pipeline;
@@ -246,7 +256,8 @@ Curve grazing_curve(Effort effort) {
     const PictureResult fast = pipeline.picture(scene, RenderMethod::kExact, spp);
     const PictureResult truth = pipeline.picture(scene, RenderMethod::kPath, spp);
     curve.series[0].values.push_back(relative_error(fast.image, truth.image));
-    curve.series[1].values.push_back(std::abs(mean_of(fast.image, "") / mean_of(truth.image, "") - 1));
+    curve.series[1].values.push_back(
+        std::abs(mean_of(fast.image, "") / mean_of(truth.image, "") - 1));
   }
   return curve;
 }
@@ -265,7 +276,8 @@ Curve truncation_curve(Effort effort) {
     curve.series.push_back({"shipped, beta_R 15 deg", {}});
     curve.series.push_back({"cones = \"on\"", {}});
   }
-  const std::vector<double> wanders = full ? std::vector<double>{0, 4, 8, 15, 25} : std::vector<double>{0, 25};
+  const std::vector<double> wanders =
+      full ? std::vector<double>{0, 4, 8, 15, 25} : std::vector<double>{0, 25};
   for (std::size_t which = 0; which < curve.series.size(); ++which) {
     for (const double wander : wanders) {
       SmallFabric fabric = satin();
@@ -278,7 +290,8 @@ Curve truncation_curve(Effort effort) {
       double square = 0;
       double mean = 0;
       int count = 0;
-      for (const double view : full ? std::vector<double>{-60, -20, 20, 60} : std::vector<double>{20}) {
+      for (const double view :
+           full ? std::vector<double>{-60, -20, 20, 60} : std::vector<double>{20}) {
         for (const double azimuth : {0.0, 60.0, 90.0}) {
           SmallScene scene;
           scene.wide_mm = 1;
@@ -289,7 +302,8 @@ Curve truncation_curve(Effort effort) {
             const Image image = pipeline.picture(scene, method, full ? 256 : 64).image;
             const std::vector<Rgb> values = layer_of(image, "multiple", "picture");
             Rgbd sum = Rgbd::Zero();
-            for (const Rgb& value : values) sum += value.cast<double>() / static_cast<double>(values.size());
+            for (const Rgb& value : values)
+              sum += value.cast<double>() / static_cast<double>(values.size());
             return sum;
           };
           const Rgbd truth = colour(RenderMethod::kPath);
@@ -329,7 +343,8 @@ Curve zoom_curve(Effort effort) {
     const PictureResult truth = pipeline.picture(scene, RenderMethod::kPath, spp);
     for (int edge = 1; edge <= scene.pixels / 4; edge *= 2) {
       if (l == 0) curve.drivers.push_back(finest * edge);
-      curve.series[l].values.push_back(relative_error(averaged(fast.image, edge), averaged(truth.image, edge)));
+      curve.series[l].values.push_back(
+          relative_error(averaged(fast.image, edge), averaged(truth.image, edge)));
     }
   }
   return curve;
@@ -340,9 +355,12 @@ Curve distance_curve(Effort effort) {
               .driver = "edge of a pixel, repeats of the cloth",
               .measure = "noise: deviation of pixels / mean",
               .is_log = true,
-              .drivers = effort == Effort::kFull ? std::vector<double>{0.01, 0.03, 0.1, 0.3, 1, 3, 10, 30}
-                                                 : std::vector<double>{0.03, 3},
-              .series = {{"between pixels, 16 spp", {}}, {"reported, 16 spp", {}}, {"reported, 64 spp", {}}},
+              .drivers = effort == Effort::kFull
+                             ? std::vector<double>{0.01, 0.03, 0.1, 0.3, 1, 3, 10, 30}
+                             : std::vector<double>{0.03, 3},
+              .series = {{"between pixels, 16 spp", {}},
+                         {"reported, 16 spp", {}},
+                         {"reported, 64 spp", {}}},
               .warning_from = 1.0};
   const SmallFabric fabric;
   SmallPipeline pipeline(fabric);
@@ -371,8 +389,8 @@ Curve distance_curve(Effort effort) {
       double variance = 0;
       for (const Rgb& value : layer_of(fast.image, "Variance", "picture"))
         variance += static_cast<double>(value.sum()) / 3;
-      curve.series[spp == 16 ? 1 : 2].values.push_back(std::sqrt(variance / static_cast<double>(colors.size())) /
-                                                       mean_of(fast.image, ""));
+      curve.series[spp == 16 ? 1 : 2].values.push_back(
+          std::sqrt(variance / static_cast<double>(colors.size())) / mean_of(fast.image, ""));
     }
   }
   return curve;

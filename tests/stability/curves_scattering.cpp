@@ -17,18 +17,22 @@ namespace heddle::stability {
 namespace {
 
 FiberScattering gray_fiber(double beta_deg, double gamma_deg) {
-  return {Rgbd::Constant(0.3), Rgbd::Constant(0.7), radians(beta_deg), radians(beta_deg), radians(gamma_deg)};
+  return {Rgbd::Constant(0.3), Rgbd::Constant(0.7), radians(beta_deg), radians(beta_deg),
+          radians(gamma_deg)};
 }
 
-/// Gamma of the R lobe from the definition: a product rule over the sphere, fine around the light and around the cone.
-double brute_force_gamma(const FiberScattering& fiber, const SphericalGaussian& light, const Vec3d& wo) {
+/// Gamma of the R lobe from the definition: a product rule over the sphere, fine around the light
+/// and around the cone.
+double brute_force_gamma(const FiberScattering& fiber, const SphericalGaussian& light,
+                         const Vec3d& wo) {
   const FiberDirection axis = fiber_direction(light.axis);
   const double theta_o = fiber_direction(wo).theta;
   const double width = 1 / std::sqrt(light.sharpness + 1);
   std::vector<double> thetas;
   append_geometric_breaks(-theta_o, 0.5 * fiber.beta_r, kPi, thetas);
   append_geometric_breaks(axis.theta, 0.5 * width, kPi, thetas);
-  for (const double end : {-kPi / 2, kPi / 2}) append_geometric_breaks(end, 0.25 * fiber.beta_r, kPi, thetas);
+  for (const double end : {-kPi / 2, kPi / 2})
+    append_geometric_breaks(end, 0.25 * fiber.beta_r, kPi, thetas);
   std::vector<double> phis;
   append_geometric_breaks(axis.phi, 0.5 * width / std::max(std::cos(axis.theta), 0.1), kPi, phis);
   const QuadratureRule phi_rule = gauss_legendre_panels(8, axis.phi - kPi, axis.phi + kPi, phis);
@@ -50,9 +54,9 @@ Curve gamma_curve(Effort effort) {
               .driver = "sharpness of the light",
               .measure = "mean |error| / mean value",
               .is_log = true,
-              .drivers = effort == Effort::kFull
-                             ? std::vector<double>{1, 3, 10, 25, 50, 100, 200, 400, 1000, 3000, 1e4, 1e5}
-                             : std::vector<double>{1, 25, 100, 400, 1e4},
+              .drivers = effort == Effort::kFull ? std::vector<double>{1, 3, 10, 25, 50, 100, 200,
+                                                                       400, 1000, 3000, 1e4, 1e5}
+                                                 : std::vector<double>{1, 25, 100, 400, 1e4},
               .series = {{"as printed", {}}, {"shipped", {}}},
               .warning_from = kPrintedGammaSharpness,
               .warns_above = false};
@@ -63,12 +67,14 @@ Curve gamma_curve(Effort effort) {
     double printed = 0;
     double shipped = 0;
     for (int k = 0; k < lights; ++k) {
-      RandomStream random(2, RandomStage::kTest, static_cast<std::uint64_t>(sharpness), static_cast<std::uint64_t>(k));
+      RandomStream random(2, RandomStage::kTest, static_cast<std::uint64_t>(sharpness),
+                          static_cast<std::uint64_t>(k));
       const double theta_o = radians(75 + 10 * random.uniform_double());
       const double spread = std::hypot(fiber.beta_r, 1 / std::sqrt(sharpness));
-      const double theta =
-          sample_cut_gaussian(static_cast<float>(-theta_o), static_cast<float>(std::min(spread, 1.5)), random);
-      const SphericalGaussian light{vector_from({theta, kPi * (2 * random.uniform_double() - 1)}), sharpness};
+      const double theta = sample_cut_gaussian(static_cast<float>(-theta_o),
+                                               static_cast<float>(std::min(spread, 1.5)), random);
+      const SphericalGaussian light{vector_from({theta, kPi * (2 * random.uniform_double() - 1)}),
+                                    sharpness};
       const Vec3d wo = vector_from({theta_o, 0});
       const double exact = brute_force_gamma(fiber, light, wo);
       total += exact;
@@ -82,13 +88,14 @@ Curve gamma_curve(Effort effort) {
 }
 
 Curve bessel_curve(Effort) {
-  Curve curve{.title = "I0(x) exp(-x) at large arguments",
-              .driver = "x",
-              .measure = "relative error (1 where it is not a number)",
-              .is_log = true,
-              .drivers = {1e-3, 0.1, 1, 10, 50, 80, 100, 700, 1e3, 1e4, 1e6, 1e8, 1e12},
-              .series = {{"as printed, float", {}}, {"shipped, float", {}}, {"shipped, double", {}}},
-              .warning_from = {}};
+  Curve curve{
+      .title = "I0(x) exp(-x) at large arguments",
+      .driver = "x",
+      .measure = "relative error (1 where it is not a number)",
+      .is_log = true,
+      .drivers = {1e-3, 0.1, 1, 10, 50, 80, 100, 700, 1e3, 1e4, 1e6, 1e8, 1e12},
+      .series = {{"as printed, float", {}}, {"shipped, float", {}}, {"shipped, double", {}}},
+      .warning_from = {}};
   for (const double x : curve.drivers) {
     // (1 / pi) integral over [0, pi] of exp(x (cos t - 1)), on panels as narrow as the peak.
     std::vector<double> breaks;
@@ -99,10 +106,13 @@ Curve bessel_curve(Effort) {
                                      return std::exp(-2 * x * half * half);
                                    }) /
                          kPi;
-    const auto error = [&](double value) { return std::isfinite(value) ? std::abs(value / exact - 1) : 1.0; };
+    const auto error = [&](double value) {
+      return std::isfinite(value) ? std::abs(value / exact - 1) : 1.0;
+    };
     const auto small = static_cast<float>(x);
     // The printed product, in the precision of a renderer.
-    const float printed = static_cast<float>(std::cyl_bessel_i(0.0, std::min(x, 700.0))) * std::exp(-small);
+    const float printed =
+        static_cast<float>(std::cyl_bessel_i(0.0, std::min(x, 700.0))) * std::exp(-small);
     curve.series[0].values.push_back(error(static_cast<double>(printed)));
     curve.series[1].values.push_back(error(static_cast<double>(scaled_bessel_i0(small))));
     curve.series[2].values.push_back(error(scaled_bessel_i0(x)));
@@ -124,16 +134,20 @@ Curve lobe_width_curve(Effort) {
     const BcsdfTable table(fiber);
     for (const double from_axis : curve.drivers) {
       const double theta_i = kPi / 2 - radians(from_axis);
-      const Vec3 wi = Vec3d(std::cos(radians(from_axis)), std::sin(radians(from_axis)), 0).cast<float>();
+      const Vec3 wi =
+          Vec3d(std::cos(radians(from_axis)), std::sin(radians(from_axis)), 0).cast<float>();
       std::vector<double> thetas;
       append_geometric_breaks(-theta_i, 0.5 * fiber.beta_r, kPi, thetas);
-      const QuadratureRule phis = gauss_legendre_panels(12, 0, kPi, {kPi / 2, kPi - fiber.gamma_tt});
-      const double energy = integrate(gauss_legendre_panels(10, -kPi / 2, kPi / 2, thetas), [&](double theta) {
-        const double cosine = std::cos(theta);
-        return cosine * cosine * integrate(phis, [&](double phi) {
-                 return 2 * static_cast<double>(table.evaluate(wi, vector_from({theta, phi}).cast<float>())[0]);
-               });
-      });
+      const QuadratureRule phis =
+          gauss_legendre_panels(12, 0, kPi, {kPi / 2, kPi - fiber.gamma_tt});
+      const double energy =
+          integrate(gauss_legendre_panels(10, -kPi / 2, kPi / 2, thetas), [&](double theta) {
+            const double cosine = std::cos(theta);
+            return cosine * cosine * integrate(phis, [&](double phi) {
+                     return 2 * static_cast<double>(
+                                    table.evaluate(wi, vector_from({theta, phi}).cast<float>())[0]);
+                   });
+          });
       const double fresnel = 0.3 + 0.7 * std::pow(1 - std::sin(radians(from_axis)), 5);
       series.values.push_back(std::abs(energy / (fresnel + (1 - fresnel) * 0.7) - 1));
     }

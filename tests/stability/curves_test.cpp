@@ -1,5 +1,6 @@
-// Bounds on the curves of docs/stability.md: what the shipped methods keep however they are driven, where the printed or simpler
-// form fails (so that the curve is known to measure what it claims), and that the program's limit lies where the error grows.
+// Bounds on the curves of docs/stability.md: what the shipped methods keep however they are driven,
+// where the printed or simpler form fails (so that the curve is known to measure what it claims),
+// and that the program's limit lies where the error grows.
 
 #include <gtest/gtest.h>
 
@@ -41,7 +42,8 @@ TEST(GammaStability, SoftLightAtGrazingViews) {
   EXPECT_LT(curve.of("shipped")[3], 0.003);
   EXPECT_LT(largest(curve.of("shipped")), 0.039);
   for (std::size_t k = 0; k < curve.drivers.size(); ++k) {
-    EXPECT_EQ(curve.of("as printed")[k] > 0.05, warned(curve, curve.drivers[k])) << curve.drivers[k];
+    EXPECT_EQ(curve.of("as printed")[k] > 0.05, warned(curve, curve.drivers[k]))
+        << curve.drivers[k];
   }
 }
 
@@ -78,27 +80,31 @@ TEST(VisibilityStability, LightFromBothSides) {
   for (std::size_t k = 0; k < curve.drivers.size(); ++k) {
     EXPECT_LT(curve.of("blended (shipped)")[k], 0.32);
     EXPECT_LT(curve.of("blended, mean")[k], 0.15);
-    EXPECT_EQ(curve.of("sum of Gaussians")[k] > 0.32, curve.drivers[k] > kSphereLobesSharpness) << curve.drivers[k];
+    EXPECT_EQ(curve.of("sum of Gaussians")[k] > 0.32, curve.drivers[k] > kSphereLobesSharpness)
+        << curve.drivers[k];
   }
 }
 
 TEST(RingingStability, LightFromOneSide) {
   const Curve curve = measured(ringing_curve);
   EXPECT_LT(largest(curve.of("negative share")), 0.07);
-  EXPECT_LT(curve.of("negative share")[0], curve.of("negative share")[1]) << "sharper light rings more";
+  EXPECT_LT(curve.of("negative share")[0], curve.of("negative share")[1])
+      << "sharper light rings more";
 }
 
 TEST(TruncationStability, ParallelFilaments) {
   const Curve curve = measured(truncation_curve);
   const auto& shipped = curve.of("shipped");
   const auto& harmonics = curve.of("order 5 alone");
-  // No twist and no wander at all: nothing but the crimp turns the light's cone, and order 5 is known to fail.
+  // No twist and no wander at all: nothing but the crimp turns the light's cone, and order 5 is
+  // known to fail.
   EXPECT_GT(harmonics[0], 0.5);
   EXPECT_LT(shipped[0], 0.75 * harmonics[0]);
   EXPECT_LT(largest(shipped), 0.45);
   for (std::size_t k = 0; k < curve.drivers.size(); ++k) {
     if (!warned(curve, curve.drivers[k])) {
-      EXPECT_LT(harmonics[k], 0.35) << curve.drivers[k];  // three pairs of light and view, of which each counts
+      // three pairs of light and view, of which each counts
+      EXPECT_LT(harmonics[k], 0.35) << curve.drivers[k];
     }
   }
 }
@@ -126,7 +132,8 @@ TEST(RimStability, EndOfTheCloth) {
   for (std::size_t k = 0; k < curve.drivers.size(); ++k) {
     EXPECT_LT(curve.of("reference")[k], 0.25);
     if (!warned(curve, curve.drivers[k] - 1)) {
-      EXPECT_LT(curve.of("reference")[k], 0.03) << "a thickness beyond the limit, " << curve.drivers[k];
+      EXPECT_LT(curve.of("reference")[k], 0.03)
+          << "a thickness beyond the limit, " << curve.drivers[k];
     }
     // The rim itself is cut and shows a little; the rest is that of endless cloth.
     EXPECT_LT(curve.of("shipped, which should follow it")[k], 0.03);
@@ -137,7 +144,8 @@ TEST(RimStability, EndOfTheCloth) {
 TEST(BehindStability, ThinCloth) {
   const Curve curve = measured(behind_curve);
   for (std::size_t k = 0; k < curve.drivers.size(); ++k) {
-    EXPECT_LT(curve.of("data for light from both sides")[k], curve.drivers[k] < 150 ? 0.2 : 1.3) << curve.drivers[k];
+    EXPECT_LT(curve.of("data for light from both sides")[k], curve.drivers[k] < 150 ? 0.2 : 1.3)
+        << curve.drivers[k];
     if (!warned(curve, curve.drivers[k])) {
       EXPECT_LT(curve.of("data for light from the face")[k], 0.1) << curve.drivers[k];
     }
@@ -165,7 +173,8 @@ TEST(ZoomStability, OneValuePerSegment) {
   const Curve curve = measured(zoom_curve);
   for (const Series& series : curve.series) {
     // Averages of the same values: an average has no more error than what it is made of.
-    for (std::size_t k = 1; k < series.values.size(); ++k) EXPECT_LT(series.values[k], 1.02 * series.values[k - 1]);
+    for (std::size_t k = 1; k < series.values.size(); ++k)
+      EXPECT_LT(series.values[k], 1.02 * series.values[k - 1]);
     EXPECT_LT(series.values[0], 0.8) << series.name;
   }
 }
@@ -175,7 +184,8 @@ TEST(DistanceStability, NoiseIsWhatTheSamplesSay) {
   const std::size_t far = curve.drivers.size() - 1;
   ASSERT_TRUE(warned(curve, curve.drivers[far]));
   const double reported = curve.of("reported, 16 spp")[far];
-  // 575 pairs of pixels, heavy tails: the deviation is good to some 10 %. More would be structure, which is aliasing.
+  // 575 pairs of pixels, heavy tails: the deviation is good to some 10 %. More would be structure,
+  // which is aliasing.
   EXPECT_NEAR(curve.of("between pixels, 16 spp")[far] / reported, 1, 0.2);
   EXPECT_NEAR(curve.of("reported, 64 spp")[far] / reported, 0.5, 0.05);
   EXPECT_LT(reported, 0.5);

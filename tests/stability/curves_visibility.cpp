@@ -20,9 +20,11 @@
 namespace heddle::stability {
 namespace {
 
-/// Light that is drawn from a Gaussian, hidden by rays from the segment's origin, and scattered by the BCSDF's definition.
-Rgbd traced(const TileScene& tile, const SegmentOrigins& origins, const FiberScattering& fiber, std::uint32_t segment,
-            const Vec3& wo, const Vec3& axis, float sharpness, bool both_sides, int rays, RandomStream& random) {
+/// Light that is drawn from a Gaussian, hidden by rays from the segment's origin, and scattered by
+/// the BCSDF's definition.
+Rgbd traced(const TileScene& tile, const SegmentOrigins& origins, const FiberScattering& fiber,
+            std::uint32_t segment, const Vec3& wo, const Vec3& axis, float sharpness,
+            bool both_sides, int rays, RandomStream& random) {
   const Exemplar& exemplar = tile.exemplar();
   const Mat3 to_fiber = frame_about(exemplar.segment_tangent(segment)).transpose();
   Rgbd sum = Rgbd::Zero();
@@ -38,16 +40,20 @@ Rgbd traced(const TileScene& tile, const SegmentOrigins& origins, const FiberSca
 }
 
 Curve visibility_errors(Effort effort, bool both_sides) {
-  Curve curve{
-      .title = both_sides ? "Forms of visibility, light from both sides" : "Forms of visibility, light from the face",
-      .driver = "sharpness of the light",
-      .measure = "sum of |error| / sum of values, single scattering of segments",
-      .is_log = true,
-      .drivers = effort == Effort::kFull
-                     ? std::vector<double>{1, 3, 6, 10, 13, 16, 20, 50, 100, 200, 400, 1000, 3000, 1e4}
-                     : std::vector<double>{2, 14, 20, 50, 200, 1000},
-      .series = {{"sum of Gaussians", {}}, {"signed distance", {}}, {"blended (shipped)", {}}, {"blended, mean", {}}},
-      .warning_from = {}};
+  Curve curve{.title = both_sides ? "Forms of visibility, light from both sides"
+                                  : "Forms of visibility, light from the face",
+              .driver = "sharpness of the light",
+              .measure = "sum of |error| / sum of values, single scattering of segments",
+              .is_log = true,
+              .drivers = effort == Effort::kFull
+                             ? std::vector<double>{1, 3, 6, 10, 13, 16, 20, 50, 100, 200, 400, 1000,
+                                                   3000, 1e4}
+                             : std::vector<double>{2, 14, 20, 50, 200, 1000},
+              .series = {{"sum of Gaussians", {}},
+                         {"signed distance", {}},
+                         {"blended (shipped)", {}},
+                         {"blended, mean", {}}},
+              .warning_from = {}};
   const TileScene tile(synthesize(test::small_fabric()));
   const Exemplar& exemplar = tile.exemplar();
   const SegmentOrigins origins = find_segment_origins(tile, both_sides, OriginChoice::kExposed, 1);
@@ -73,28 +79,32 @@ Curve visibility_errors(Effort effort, bool both_sides) {
     double total = 0;
     std::array<double, 4> error{};
     for (int k = 0; k < cases; ++k) {
-      RandomStream random(3, RandomStage::kTest, 0, static_cast<std::uint64_t>(k));  // the same cases for every light
+      // the same cases for every light
+      RandomStream random(3, RandomStage::kTest, 0, static_cast<std::uint64_t>(k));
       const std::uint32_t segment =
           seeing[static_cast<std::size_t>(random.uniform() * static_cast<float>(seeing.size()))];
       const Vec3 wo = sample_hemisphere(Vec3::UnitZ(), random);
-      const Vec3 axis = both_sides ? sample_sphere(random) : sample_hemisphere(Vec3::UnitZ(), random);
+      const Vec3 axis =
+          both_sides ? sample_sphere(random) : sample_hemisphere(Vec3::UnitZ(), random);
       const Vec3 tangent = exemplar.segment_tangent(segment);
       const std::uint16_t material = exemplar.segment_material(segment);
       const ShadingPoint point = {segment, 0, material, {tangent, tangent}, {wo, wo}};
       const DirectionPair light = {axis, axis};
-      const double exact =
-          traced(tile, origins, exemplar.scattering[material], segment, wo, axis, sharpness, both_sides, rays, random)
-              .sum();
+      const double exact = traced(tile, origins, exemplar.scattering[material], segment, wo, axis,
+                                  sharpness, both_sides, rays, random)
+                               .sum();
       total += exact;
       const std::array<const SingleScattering*, 3> forms = {&soft, &sharp, &shipped};
       for (std::size_t f = 0; f < forms.size(); ++f) {
         const double difference =
-            static_cast<double>(forms[f]->spherical_gaussian(point, light, sharpness).sum()) - exact;
+            static_cast<double>(forms[f]->spherical_gaussian(point, light, sharpness).sum()) -
+            exact;
         error[f] += std::abs(difference);
         if (f == 2) error[3] += difference;
       }
     }
-    for (std::size_t f = 0; f < error.size(); ++f) curve.series[f].values.push_back(std::abs(error[f]) / total);
+    for (std::size_t f = 0; f < error.size(); ++f)
+      curve.series[f].values.push_back(std::abs(error[f]) / total);
   }
   return curve;
 }

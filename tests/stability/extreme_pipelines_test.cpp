@@ -1,6 +1,7 @@
-// Fabrics at the ends of every parameter's range, from the weave to the picture: no value that is not a number, no hang, and no
-// more light than there is. Light: constant from everywhere (an albedo is then a mean radiance), the sharpest Gaussian that a
-// scene takes, and the softest but one.
+// Fabrics at the ends of every parameter's range, from the weave to the picture: no value that is
+// not a number, no hang, and no more light than there is. Light: constant from everywhere (an
+// albedo is then a mean radiance), the sharpest Gaussian that a scene takes, and the softest but
+// one.
 
 #include <gtest/gtest.h>
 
@@ -38,7 +39,8 @@ void expect_sound(const SmallFabric& fabric, const std::string& what, Extremes& 
   for (const char* light : {"type = \"sg\"\naxis = [0.2, 0.1, 1]\nsharpness = 0\n",
                             "type = \"sg\"\naxis = [0.2, 0.1, 1]\nsharpness = 0.001\n",
                             "type = \"sg\"\naxis = [0.2, 0.1, 1]\nsharpness = 1000000\n"}) {
-    for (const RenderMethod method : {RenderMethod::kExact, RenderMethod::kVolume, RenderMethod::kPath}) {
+    for (const RenderMethod method :
+         {RenderMethod::kExact, RenderMethod::kVolume, RenderMethod::kPath}) {
       SmallScene scene;
       scene.light = light;
       scene.pixels = 12;
@@ -46,20 +48,24 @@ void expect_sound(const SmallFabric& fabric, const std::string& what, Extremes& 
       double sum = 0;
       for (const char* layer : {"", "single", "multiple"}) {
         for (const Rgb& value : layer_of(image, layer, "picture")) {
-          ASSERT_TRUE(value.isFinite().all()) << light << render_method_name(method) << ' ' << layer;
+          ASSERT_TRUE(value.isFinite().all())
+              << light << render_method_name(method) << ' ' << layer;
           if (*layer == 0) sum += static_cast<double>(value.sum()) / 3;
         }
       }
-      // The light's irradiance is 3 per colour; constant light of radiance 3 / 4 pi has an albedo for a mean ratio.
+      // The light's irradiance is 3 per colour; constant light of radiance 3 / 4 pi has an albedo
+      // for a mean ratio.
       const bool is_constant = std::string(light).find("= 0\n") != std::string::npos;
       const double mean = sum / (12 * 12);
       const double ratio = is_constant ? mean / (3 / (4 * kPi)) : mean * kPi / 3;
       extremes.least = std::min(extremes.least, ratio);
       if (is_constant) extremes.most = std::max(extremes.most, ratio);
       ++extremes.pictures;
-      // Constant light has one harmonic. Under sharp light few harmonics of lobes 0.1 degrees wide ring.
+      // Constant light has one harmonic. Under sharp light few harmonics of lobes 0.1 degrees wide
+      // ring.
       EXPECT_GT(ratio, is_constant ? 0 : -0.3) << light << render_method_name(method);
-      // Not reciprocal: many scatterings of this BCSDF may return 1.13 of constant light (known of a bundle of cotton).
+      // Not reciprocal: many scatterings of this BCSDF may return 1.13 of constant light (known of
+      // a bundle of cotton).
       if (is_constant) {
         EXPECT_LT(ratio, method == RenderMethod::kPath ? 1.15 : 1.3) << render_method_name(method);
       }
@@ -79,8 +85,8 @@ TEST(ExtremePipelinesStability, LobesAndColours) {
       expect_sound(fabric, "beta " + std::to_string(width) + " colour " + color, extremes);
     }
   }
-  std::printf("  %d pictures: least %.4f, most of constant light %.4f\n", extremes.pictures, extremes.least,
-              extremes.most);
+  std::printf("  %d pictures: least %.4f, most of constant light %.4f\n", extremes.pictures,
+              extremes.least, extremes.most);
 }
 
 TEST(ExtremePipelinesStability, Shapes) {
@@ -121,8 +127,8 @@ TEST(ExtremePipelinesStability, Shapes) {
   SmallFabric both = quick_fabric();
   both.light_from = "both";
   expect_sound(both, "light from both sides", extremes);
-  std::printf("  %d pictures: least %.4f, most of constant light %.4f\n", extremes.pictures, extremes.least,
-              extremes.most);
+  std::printf("  %d pictures: least %.4f, most of constant light %.4f\n", extremes.pictures,
+              extremes.least, extremes.most);
 }
 
 }  // namespace

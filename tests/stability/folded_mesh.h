@@ -1,7 +1,7 @@
 #ifndef HEDDLE_TESTS_STABILITY_FOLDED_MESH_H_
 #define HEDDLE_TESTS_STABILITY_FOLDED_MESH_H_
-// Cloth in folds z = a cos(x), one unit of length a millimetre, as a mesh with exact normals and as an OBJ file. The least radius of
-// curvature, 1 / a, is at the crests and in the troughs.
+// Cloth in folds z = a cos(x), one unit of length a millimetre, as a mesh with exact normals and as
+// an OBJ file. The least radius of curvature, 1 / a, is at the crests and in the troughs.
 
 #include <cmath>
 #include <fstream>
@@ -45,8 +45,8 @@ class FoldedMesh {
     std::ofstream file(path);
     file.precision(12);
     for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
-      file << "v " << mesh.positions[v].transpose() << "\nvt " << mesh.fabric[v].transpose() << "\nvn "
-           << mesh.normals[v].transpose() << '\n';
+      file << "v " << mesh.positions[v].transpose() << "\nvt " << mesh.fabric[v].transpose()
+           << "\nvn " << mesh.normals[v].transpose() << '\n';
     }
     for (const auto& triangle : mesh.triangles) {
       file << 'f';
@@ -62,7 +62,8 @@ class FoldedMesh {
     for (int k = 0; k < kSteps; ++k) {
       const double x = 2 * kPi * (k + 0.5) / kSteps;
       const double slope = height_ * std::sin(x);
-      tight += std::pow(1 + slope * slope, 1.5) < radius_mm * height_ * std::abs(std::cos(x)) ? 1 : 0;
+      tight +=
+          std::pow(1 + slope * slope, 1.5) < radius_mm * height_ * std::abs(std::cos(x)) ? 1 : 0;
     }
     return static_cast<double>(tight) / kSteps;
   }

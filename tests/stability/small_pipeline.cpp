@@ -19,17 +19,22 @@ std::string list(const Vec3d& v) {
 
 std::string SmallFabric::toml() const {
   const std::string yarn = fmt::format(
-      "fiber = \"thread\"\nspacing_mm = {}\nwidth_mm = {}\nheight_mm = {}\nplies = 1\nfibers_per_ply = {}\n"
+      "fiber = \"thread\"\nspacing_mm = {}\nwidth_mm = {}\nheight_mm = {}\nplies = "
+      "1\nfibers_per_ply = {}\n"
       "yarn_twist_per_m = 0\nply_twist_per_m = {}\nmigration = 0\nwander_rms_deg = {}\n",
       spacing_mm, width_mm, height_mm, fibers, twist_per_m, wander_deg);
   return fmt::format(
-             "name = \"small\"\nlight_from = \"{}\"\nsegment_um = {}\n[weave]\n{}\nrepeats_x = 1\nrepeats_y = 1\n"
-             "crimp_warp = 0.5\n[fiber.thread]\nradius_um = {}\ncolor_r = {}\ncolor_tt = {}\nbeta_r_deg = {}\n"
+             "name = \"small\"\nlight_from = \"{}\"\nsegment_um = {}\n[weave]\n{}\nrepeats_x = "
+             "1\nrepeats_y = 1\n"
+             "crimp_warp = 0.5\n[fiber.thread]\nradius_um = {}\ncolor_r = {}\ncolor_tt = "
+             "{}\nbeta_r_deg = {}\n"
              "beta_tt_deg = {}\ngamma_tt_deg = {}\n",
-             light_from, segment_um, weave, radius_um, color_r, color_tt, beta_r_deg, beta_tt_deg, gamma_tt_deg) +
+             light_from, segment_um, weave, radius_um, color_r, color_tt, beta_r_deg, beta_tt_deg,
+             gamma_tt_deg) +
          "[warp]\n" + yarn + "[weft]\n" + yarn +
          fmt::format(
-             "[visibility]\npca_segments = 512\n[transfer]\norder = {}\ncell_mean_free_paths = {}\nmin_paths = {}\n"
+             "[visibility]\npca_segments = 512\n[transfer]\norder = {}\ncell_mean_free_paths = "
+             "{}\nmin_paths = {}\n"
              "max_paths = {}\ncones = \"{}\"\n[volume]\n",
              order, cell_mean_free_paths, paths, paths, cones);
 }
@@ -37,10 +42,13 @@ std::string SmallFabric::toml() const {
 std::string SmallScene::toml() const {
   const double distance = (eye - look_at).norm();
   const double fov = 2 * std::atan(0.5 * wide_mm / distance) * 180 / kPi;
-  const std::string piece = cloth.empty() ? fmt::format("flat_mm = [{}, {}]\n", flat_mm, flat_mm) : cloth;
+  const std::string piece =
+      cloth.empty() ? fmt::format("flat_mm = [{}, {}]\n", flat_mm, flat_mm) : cloth;
   return fmt::format(
-      "name = \"small\"\n[camera]\nposition_mm = {}\nlook_at_mm = {}\nup = [0, 1, 0.001]\nfov_deg = {}\n"
-      "fov_axis = \"horizontal\"\nresolution_px = [{}, {}]\n[[light]]\n{}irradiance = [3, 3, 3]\n[[cloth]]\n{}"
+      "name = \"small\"\n[camera]\nposition_mm = {}\nlook_at_mm = {}\nup = [0, 1, 0.001]\nfov_deg "
+      "= {}\n"
+      "fov_axis = \"horizontal\"\nresolution_px = [{}, {}]\n[[light]]\n{}irradiance = [3, 3, "
+      "3]\n[[cloth]]\n{}"
       "fabric = \"fabric.toml\"\n",
       list(eye), list(look_at), fov, pixels, pixels, light, piece);
 }
@@ -63,8 +71,8 @@ SceneJob SmallPipeline::job(const SmallScene& scene, const SceneVariant& variant
   return SceneJob(folder() / "scene.toml", context_, variant);
 }
 
-PictureResult SmallPipeline::picture(const SmallScene& scene, RenderMethod method, int spp, bool local,
-                                     const SceneVariant& variant) {
+PictureResult SmallPipeline::picture(const SmallScene& scene, RenderMethod method, int spp,
+                                     bool local, const SceneVariant& variant) {
   SceneJob made = job(scene, variant);
   PictureRequest request = made.request(made.config().views[0]);
   request.method = method;
@@ -75,11 +83,16 @@ PictureResult SmallPipeline::picture(const SmallScene& scene, RenderMethod metho
 
 FabricPack SmallPipeline::pack(const FabricVariant& variant) {
   FabricStages stages(folder() / "fabric.toml", context_, variant);
-  return load_pack(stages.pack({.ssdf = false, .sgs = false, .transfer = true, .volume = false, .order = {}}).path);
+  return load_pack(
+      stages.pack({.ssdf = false, .sgs = false, .transfer = true, .volume = false, .order = {}})
+          .path);
 }
 
-double relative_error(const Image& picture, const Image& reference, const std::vector<bool>& chosen) {
-  const auto layer = [](const Image& image, const char* name) { return layer_of(image, name, "picture"); };
+double relative_error(const Image& picture, const Image& reference,
+                      const std::vector<bool>& chosen) {
+  const auto layer = [](const Image& image, const char* name) {
+    return layer_of(image, name, "picture");
+  };
   const std::vector<Rgb> f0 = layer(picture, "half0");
   const std::vector<Rgb> f1 = layer(picture, "half1");
   const std::vector<Rgb> r0 = layer(reference, "half0");

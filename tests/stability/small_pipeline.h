@@ -1,7 +1,7 @@
 #ifndef HEDDLE_TESTS_STABILITY_SMALL_PIPELINE_H_
 #define HEDDLE_TESTS_STABILITY_SMALL_PIPELINE_H_
-// A fabric of some 600 segments and flat scenes of it, taken through all stages of the program in the calling process, in a
-// folder of its own that is removed at the end.
+// A fabric of some 600 segments and flat scenes of it, taken through all stages of the program in
+// the calling process, in a folder of its own that is removed at the end.
 
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -77,9 +77,11 @@ class SmallPipeline {
   StageContext context_;
 };
 
-/// Root of the mean over pixels and colours of (F0 - R0)(F1 - R1), 0 and 1 the pictures' halves, over the reference's mean.
-/// Pictures of one seed share eye rays, whose noise cancels. `chosen`: pixels, all where empty.
-double relative_error(const Image& picture, const Image& reference, const std::vector<bool>& chosen = {});
+/// Root of the mean over pixels and colours of (F0 - R0)(F1 - R1), 0 and 1 the pictures' halves,
+/// over the reference's mean. Pictures of one seed share eye rays, whose noise cancels. `chosen`:
+/// pixels, all where empty.
+double relative_error(const Image& picture, const Image& reference,
+                      const std::vector<bool>& chosen = {});
 /// Mean of the colours of a layer.
 double mean_of(const Image& image, const std::string& layer);
 /// The picture with its halves averaged over squares of edge x edge pixels.

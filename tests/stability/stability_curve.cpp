@@ -13,21 +13,22 @@ const std::vector<double>& Curve::of(const std::string& name) const {
 }
 
 std::span<const NamedCurve> all_curves() {
-  static constexpr std::array<NamedCurve, 15> kCurves = {{{"gamma", gamma_curve},
-                                                          {"visibility", visibility_curve},
-                                                          {"visibility-both", sphere_visibility_curve},
-                                                          {"ringing", ringing_curve},
-                                                          {"truncation", truncation_curve},
-                                                          {"cells", cells_curve},
-                                                          {"tile-border", tile_border_curve},
-                                                          {"rim", rim_curve},
-                                                          {"behind", behind_curve},
-                                                          {"grazing", grazing_curve},
-                                                          {"grazing-light", lobe_width_curve},
-                                                          {"bessel", bessel_curve},
-                                                          {"shell", shell_curve},
-                                                          {"zoom", zoom_curve},
-                                                          {"distance", distance_curve}}};
+  static constexpr std::array<NamedCurve, 15> kCurves = {
+      {{"gamma", gamma_curve},
+       {"visibility", visibility_curve},
+       {"visibility-both", sphere_visibility_curve},
+       {"ringing", ringing_curve},
+       {"truncation", truncation_curve},
+       {"cells", cells_curve},
+       {"tile-border", tile_border_curve},
+       {"rim", rim_curve},
+       {"behind", behind_curve},
+       {"grazing", grazing_curve},
+       {"grazing-light", lobe_width_curve},
+       {"bessel", bessel_curve},
+       {"shell", shell_curve},
+       {"zoom", zoom_curve},
+       {"distance", distance_curve}}};
   return kCurves;
 }
 

@@ -1,7 +1,8 @@
 #ifndef HEDDLE_TESTS_STABILITY_STABILITY_CURVE_H_
 #define HEDDLE_TESTS_STABILITY_STABILITY_CURVE_H_
-// How wrong a method gets as something drives it out of its depth: one curve per known failure (docs/stability.md). The
-// tests of this folder hold bounds against the curves, and heddle_stability prints and draws them.
+// How wrong a method gets as something drives it out of its depth: one curve per known failure
+// (docs/stability.md). The tests of this folder hold bounds against the curves, and
+// heddle_stability prints and draws them.
 
 #include <functional>
 #include <optional>
@@ -26,7 +27,8 @@ struct Curve {
   bool is_log = false;  // the driver's axis
   std::vector<double> drivers;
   std::vector<Series> series;
-  std::optional<double> warning_from;     // the program's own limit, in units of the driver; empty: it does not warn
+  // the program's own limit, in units of the driver; empty: it does not warn
+  std::optional<double> warning_from;
   bool warns_above = true;                // beyond the limit; else below it
   std::optional<double> warning_to = {};  // where another form takes over
 

@@ -1,5 +1,5 @@
-// Every warning appears past its limit and not before it, says where and what to do, and reaches the console, the picture's report
-// and `heddle check`.
+// Every warning appears past its limit and not before it, says where and what to do, and reaches
+// the console, the picture's report and `heddle check`.
 
 #include "pipeline/warnings.h"
 
@@ -72,7 +72,8 @@ TEST(PackWarningsStability, CellsBeyondSixMeanFreePaths) {
 TEST(PackWarningsStability, CellsAreMeasuredAsTheConfigStatesThem) {
   SmallPipeline pipeline;
   const FabricPack pack = pipeline.pack();
-  EXPECT_NEAR(pack_facts(pack, TileScene(pack.exemplar)).cell_mean_free_paths, SmallFabric{}.cell_mean_free_paths, 0.3);
+  EXPECT_NEAR(pack_facts(pack, TileScene(pack.exemplar)).cell_mean_free_paths,
+              SmallFabric{}.cell_mean_free_paths, 0.3);
 }
 
 TEST(PackWarningsStability, SpecularParallelFilaments) {
@@ -136,10 +137,12 @@ class Pictures {
     const PictureResult result = pipeline_.picture(small, method, spp, true, variant);
     const std::vector<Warning> warnings = warnings_of(result.report.at("warnings"));
     for (const Warning& warning : warnings) {
-      EXPECT_NE(pipeline_.messages().find(warning_text(warning)), std::string::npos) << "said as well as reported";
+      EXPECT_NE(pipeline_.messages().find(warning_text(warning)), std::string::npos)
+          << "said as well as reported";
     }
     Subjects subjects = subjects_of(warnings);
-    std::erase(subjects, "ringing");  // of the few harmonics of this fabric; it has a test of its own
+    // of the few harmonics of this fabric; it has a test of its own
+    std::erase(subjects, "ringing");
     return subjects;
   }
 
@@ -160,7 +163,8 @@ TEST(PictureWarningsStability, ViewsAndLights) {
   EXPECT_EQ(pictures.warned(scene), Subjects{}) << "low, but in front";
   scene.light = directional(inclined(95));
   EXPECT_EQ(pictures.warned(scene), Subjects{"behind"});
-  EXPECT_EQ(pictures.warned(scene, RenderMethod::kPath), Subjects{}) << "paths know light from behind";
+  EXPECT_EQ(pictures.warned(scene, RenderMethod::kPath), Subjects{})
+      << "paths know light from behind";
   scene.cloth = "flat_mm = [40, 40]\nunderlay = true\n";
   EXPECT_EQ(pictures.warned(scene), Subjects{}) << "nothing shines through an underlay";
   scene = {};
@@ -199,9 +203,11 @@ TEST(PictureWarningsStability, SharpnessOfLights) {
   Pictures face;
   SmallScene scene;
   scene.cloth = "flat_mm = [40, 40]\nunderlay = true\n";
-  const auto warned = [&](Pictures& pictures, double sharpness, RenderMethod method, const VisibilityBlend& blend) {
+  const auto warned = [&](Pictures& pictures, double sharpness, RenderMethod method,
+                          const VisibilityBlend& blend) {
     scene.light = gaussian({0.3, 0.2, 1}, sharpness);
-    return pictures.warned(scene, method, 2, {.order = {}, .fabric = {}, .blend = blend, .surface_method = {}});
+    return pictures.warned(scene, method, 2,
+                           {.order = {}, .fabric = {}, .blend = blend, .surface_method = {}});
   };
   for (const double sharpness : {2.0, 4.0, 15.0, 99.0, 150.0, 300.0, 1e5}) {
     const bool sharp = sharpness > kLobesSharpness;
@@ -212,13 +218,16 @@ TEST(PictureWarningsStability, SharpnessOfLights) {
     EXPECT_EQ(warned(face, sharpness, RenderMethod::kExact, kSignedDistanceOnly),
               soft ? Subjects{"signed-distance"} : Subjects{});
     const bool gamma = sharpness < kPrintedGammaSharpness;
-    EXPECT_EQ(warned(face, sharpness, RenderMethod::kPrinted, {}), gamma ? Subjects{"gamma"} : Subjects{}) << sharpness;
+    EXPECT_EQ(warned(face, sharpness, RenderMethod::kPrinted, {}),
+              gamma ? Subjects{"gamma"} : Subjects{})
+        << sharpness;
   }
   Pictures both("both");
   EXPECT_EQ(warned(both, 10, RenderMethod::kExact, {}), Subjects{});
   EXPECT_EQ(warned(both, 60, RenderMethod::kExact, {}), Subjects{});
   EXPECT_EQ(warned(both, 60, RenderMethod::kExact, kLobesOnly), Subjects{"sum-of-gaussians"});
-  EXPECT_EQ(warned(both, 300, RenderMethod::kExact, {}), Subjects{}) << "the signed distance serves it";
+  EXPECT_EQ(warned(both, 300, RenderMethod::kExact, {}), Subjects{})
+      << "the signed distance serves it";
   scene.light = directional(inclined(120));
   EXPECT_EQ(both.warned(scene), Subjects{});
   scene.light = directional(inclined(90 - kPlaneDegrees + 2));
@@ -247,12 +256,14 @@ TEST(PictureWarningsStability, NegativeLight) {
   const Camera camera(config);
   SceneJob job = pictures.pipeline().job(scene);
   const ClothScene cloth(std::vector<ClothPiece>{}, {});
-  const PictureSetup setup{&cloth, {}, job.config().lights, &camera, {0, 0, 1, 1}, RenderMethod::kExact, {}};
+  const PictureSetup setup{
+      &cloth, {}, job.config().lights, &camera, {0, 0, 1, 1}, RenderMethod::kExact, {}};
   for (const float negative : {0.005F, 0.02F}) {
     FrameBuffers frame(2, 1);
     frame.multiple[0] = Rgb::Constant(1 - negative);
     frame.multiple[1] = Rgb::Constant(-negative);
-    EXPECT_EQ(subjects_of(frame_warnings(setup, frame)), negative > kNegativeShare ? Subjects{"ringing"} : Subjects{});
+    EXPECT_EQ(subjects_of(frame_warnings(setup, frame)),
+              negative > kNegativeShare ? Subjects{"ringing"} : Subjects{});
   }
 }
 
@@ -268,7 +279,9 @@ TEST(PictureWarningsStability, WideLightsOnInteractiveSurfaces) {
     PictureSetup setup{&cloth, {}, lights, &camera, {0, 0, 1, 1}, RenderMethod::kExact, {}};
     EXPECT_EQ(subjects_of(picture_warnings(setup)), Subjects{}) << sharpness;
     setup.interactive_surfaces = true;
-    EXPECT_EQ(subjects_of(picture_warnings(setup)), sharpness < kInteractiveSharpness ? Subjects{"wide-light"} : Subjects{}) << sharpness;
+    EXPECT_EQ(subjects_of(picture_warnings(setup)),
+              sharpness < kInteractiveSharpness ? Subjects{"wide-light"} : Subjects{})
+        << sharpness;
   }
 }
 
@@ -279,16 +292,19 @@ TEST(PictureWarningsStability, NoneOnTheQuickstart) {
   const FabricDocument document = read_fabric_document(config.cloths.at(0).fabric, {});
   const auto tile = std::make_shared<const TileScene>(synthesize(document.config));
   const SegmentOrigins origins = find_segment_origins(*tile, false, OriginChoice::kExposed, 1);
-  const double edge = document.transfer.cell_mean_free_paths * tile->mean_free_path(1, kMeanFreePathSamples);
+  const double edge =
+      document.transfer.cell_mean_free_paths * tile->mean_free_path(1, kMeanFreePathSamples);
   FabricPack pack =
-      pack_of(tile->exemplar(), make_segment_cells(tile->exemplar(), origins, static_cast<float>(edge)).count);
+      pack_of(tile->exemplar(),
+              make_segment_cells(tile->exemplar(), origins, static_cast<float>(edge)).count);
   EXPECT_EQ(subjects_of(pack_warnings(pack, *tile)), Subjects{});
   const std::vector<std::shared_ptr<const TileScene>> tiles = {tile};
   const ClothScene scene = make_cloth_scene(config, tiles);
   const std::vector<const FabricPack*> packs = {&pack};
   for (const ViewConfig& view : config.views) {
     const Camera camera(view.camera);
-    const PictureSetup setup{&scene, packs, config.lights, &camera, camera.full_frame(), config.method, {}};
+    const PictureSetup setup{&scene,        packs, config.lights, &camera, camera.full_frame(),
+                             config.method, {}};
     EXPECT_EQ(subjects_of(picture_warnings(setup)), Subjects{}) << view.name;
   }
 }
@@ -317,11 +333,13 @@ TEST(WarningsEndToEnd, CheckAndRunSaySoAndSucceed) {
   EXPECT_TRUE(report.at("sound").get<bool>());
   EXPECT_EQ(report.at("warnings").at(0).at("subject"), "cells");
   for (const char* round : {"rendered", "from the cache"}) {
-    const ProgramResult result = run({"run", folder.path() / "scene.toml", "-o", folder.path() / "out", "--quiet"});
+    const ProgramResult result =
+        run({"run", folder.path() / "scene.toml", "-o", folder.path() / "out", "--quiet"});
     EXPECT_EQ(result.status, 0) << result.error;
     EXPECT_NE(result.error.find("warning: behind: the light reaches"), std::string::npos)
         << round << ": " << result.error;
-    EXPECT_NE(result.error.find("warning: cells: "), std::string::npos) << round << ": " << result.error;
+    EXPECT_NE(result.error.find("warning: cells: "), std::string::npos)
+        << round << ": " << result.error;
   }
 }
 

@@ -1,6 +1,7 @@
 #ifndef HEDDLE_TESTS_SUPPORT_DIRECTION_PAIRS_H_
 #define HEDDLE_TESTS_SUPPORT_DIRECTION_PAIRS_H_
-// Pairs of directions above a surface where models of cloth go wrong: random, grazing, and opposite to each other.
+// Pairs of directions above a surface where models of cloth go wrong: random, grazing, and opposite
+// to each other.
 
 #include <cmath>
 #include <utility>
@@ -13,8 +14,8 @@ inline Vec3d random_above(RandomStream& random) {
   return sample_hemisphere(Vec3(0, 0, 1), random).cast<double>().normalized();
 }
 
-/// The k-th pair wi, wo: of any three, one is uniform, two have wi down to 1e-6 above the horizon, and one of these has wo
-/// down to 1e-6 from the mirror image of wi.
+/// The k-th pair wi, wo: of any three, one is uniform, two have wi down to 1e-6 above the horizon,
+/// and one of these has wo down to 1e-6 from the mirror image of wi.
 inline std::pair<Vec3d, Vec3d> random_pair_above(RandomStream& random, int k) {
   Vec3d wi = random_above(random);
   Vec3d wo = random_above(random);

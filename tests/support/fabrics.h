@@ -12,18 +12,20 @@
 namespace heddle::test {
 
 /// A plain weave of loosely packed yarns; `scattering` is the text of the fiber's scattering keys.
-inline std::string small_fabric_toml(const std::string& notation = "plain", const std::string& light_from = "face",
-                                     const std::string& scattering =
-                                         "color_r = [0.3, 0.2, 0.1]\ncolor_tt = [0.8, 0.6, 0.4]\nbeta_r_deg = 5\n"
-                                         "beta_tt_deg = 10\ngamma_tt_deg = 20\n") {
+inline std::string small_fabric_toml(
+    const std::string& notation = "plain", const std::string& light_from = "face",
+    const std::string& scattering =
+        "color_r = [0.3, 0.2, 0.1]\ncolor_tt = [0.8, 0.6, 0.4]\nbeta_r_deg = 5\n"
+        "beta_tt_deg = 10\ngamma_tt_deg = 20\n") {
   const std::string face = notation.starts_with("satin") ? "face = \"warp\"\n" : "";
   const std::string yarn =
-      "fiber = \"thread\"\nspacing_mm = 0.3\nwidth_mm = 0.24\nheight_mm = 0.16\nplies = 2\nfibers_per_ply = 6\n"
+      "fiber = \"thread\"\nspacing_mm = 0.3\nwidth_mm = 0.24\nheight_mm = 0.16\nplies = "
+      "2\nfibers_per_ply = 6\n"
       "yarn_twist_per_m = 1000\nply_twist_per_m = -2000\nmigration = 0.2\nwander_rms_deg = 4\n";
-  return "name = \"small\"\nseed = 7\nlight_from = \"" + light_from + "\"\nsegment_um = 60\n[weave]\nnotation = \"" +
-         notation + "\"\n" + face +
-         "repeats_x = 1\nrepeats_y = 1\ncrimp_warp = 0.4\n[fiber.thread]\nradius_um = 14\n" + scattering + "[warp]\n" +
-         yarn + "[weft]\n" + yarn;
+  return "name = \"small\"\nseed = 7\nlight_from = \"" + light_from +
+         "\"\nsegment_um = 60\n[weave]\nnotation = \"" + notation + "\"\n" + face +
+         "repeats_x = 1\nrepeats_y = 1\ncrimp_warp = 0.4\n[fiber.thread]\nradius_um = 14\n" +
+         scattering + "[warp]\n" + yarn + "[weft]\n" + yarn;
 }
 
 inline FabricConfig small_fabric(const std::string& notation = "plain") {
@@ -39,9 +41,10 @@ inline FiberScattering white_fiber() {
   return fiber;
 }
 
-/// Straight periodic fibers along x at the given (y, z), `segments` pieces each, on a width x height tile.
-inline Exemplar straight_fibers(float width, float height, const std::vector<Vec2>& places, float radius, int segments,
-                                const FiberScattering& scattering) {
+/// Straight periodic fibers along x at the given (y, z), `segments` pieces each, on a width x
+/// height tile.
+inline Exemplar straight_fibers(float width, float height, const std::vector<Vec2>& places,
+                                float radius, int segments, const FiberScattering& scattering) {
   Exemplar exemplar;
   exemplar.width_mm = width;
   exemplar.height_mm = height;
@@ -49,7 +52,8 @@ inline Exemplar straight_fibers(float width, float height, const std::vector<Vec
   exemplar.first_point = {0};
   for (const Vec2& place : places) {
     for (int k = 0; k <= segments; ++k) {
-      exemplar.points.emplace_back(width * static_cast<float>(k) / static_cast<float>(segments), place.x(), place.y());
+      exemplar.points.emplace_back(width * static_cast<float>(k) / static_cast<float>(segments),
+                                   place.x(), place.y());
     }
     exemplar.first_point.push_back(static_cast<std::uint32_t>(exemplar.points.size()));
     exemplar.radius_mm.push_back(radius);

@@ -10,10 +10,11 @@
 
 namespace heddle {
 
-/// f(damaged) for prefixes, and for copies with a byte changed: a bit flipped, or one of `replacements` in its place. Every
-/// step-th place is damaged.
+/// f(damaged) for prefixes, and for copies with a byte changed: a bit flipped, or one of
+/// `replacements` in its place. Every step-th place is damaged.
 template <class Function>
-void for_each_mutation(const std::string& whole, std::size_t step, std::string_view replacements, Function&& f) {
+void for_each_mutation(const std::string& whole, std::size_t step, std::string_view replacements,
+                       Function&& f) {
   for (std::size_t at = 0; at < whole.size(); at += step) {
     f(whole.substr(0, at));
     std::string damaged = whole;

@@ -25,13 +25,15 @@ inline FiberScattering white_isotropic() {
   return fiber;
 }
 
-/// Appends a straight fiber through (x, y, z) along the weft (x) or the warp (y), cut into `segments` pieces.
-inline void add_straight_fiber(Exemplar& exemplar, const Vec3& through, bool along_x, float radius_mm,
-                               int segments = 4) {
+/// Appends a straight fiber through (x, y, z) along the weft (x) or the warp (y), cut into
+/// `segments` pieces.
+inline void add_straight_fiber(Exemplar& exemplar, const Vec3& through, bool along_x,
+                               float radius_mm, int segments = 4) {
   const Vec3 period = along_x ? Vec3(exemplar.width_mm, 0, 0) : Vec3(0, exemplar.height_mm, 0);
   if (exemplar.first_point.empty()) exemplar.first_point.push_back(0);
   for (int k = 0; k <= segments; ++k) {
-    exemplar.points.emplace_back(through + static_cast<float>(k) / static_cast<float>(segments) * period);
+    exemplar.points.emplace_back(through +
+                                 static_cast<float>(k) / static_cast<float>(segments) * period);
   }
   // The last point is exactly one period away.
   exemplar.points.back() = through + period;
@@ -50,8 +52,8 @@ inline Exemplar single_fiber(const FiberScattering& scattering) {
   return exemplar;
 }
 
-/// Layers of straight fibers, alternately along weft and warp, staggered, 0.2 mm x 0.25 mm: about half full,
-/// open to light, no fiber touching another.
+/// Layers of straight fibers, alternately along weft and warp, staggered, 0.2 mm x 0.25 mm: about
+/// half full, open to light, no fiber touching another.
 inline Exemplar crossed_layers(const FiberScattering& scattering) {
   Exemplar exemplar;
   exemplar.width_mm = 0.2F;
@@ -63,10 +65,10 @@ inline Exemplar crossed_layers(const FiberScattering& scattering) {
     for (int k = 0; k < kPerLayer; ++k) {
       const float offset = (static_cast<float>(k) + 0.3F * static_cast<float>(layer)) / kPerLayer;
       const float z = (static_cast<float>(layer) - 2.5F) * 0.04F;
-      add_straight_fiber(
-          exemplar,
-          along_x ? Vec3(0, offset * exemplar.height_mm, z) : Vec3(offset * exemplar.width_mm, 0, z), along_x,
-          0.0175F);
+      add_straight_fiber(exemplar,
+                         along_x ? Vec3(0, offset * exemplar.height_mm, z)
+                                 : Vec3(offset * exemplar.width_mm, 0, z),
+                         along_x, 0.0175F);
     }
   }
   index_segments(exemplar);

@@ -1,13 +1,14 @@
 #ifndef HEDDLE_TESTS_SUPPORT_STATISTICS_H_
 #define HEDDLE_TESTS_SUPPORT_STATISTICS_H_
-// Statistical checks for the tests of all modules: the chi-square test of a direction sampler against its
-// density, and the z-test of two means. Both print the numbers they decide on.
+// Statistical checks for the tests of all modules: the chi-square test of a direction sampler
+// against its density, and the z-test of two means. Both print the numbers they decide on.
 //
-// Directions are binned in (theta, phi) about the x axis: theta = asin(x), phi = atan2(z, y), the fiber
-// frame. A window zooms in on narrow lobes; what falls outside is one more cell. Both a coarse and a fine
-// grid are tested: a fine grid alone hides a density that is 2 % wrong, a coarse one hides structure. The
-// Sidak correction keeps the chance of a false alarm of a whole family of tests at kSignificance. Tested in
-// tests/math/statistics_test.cpp, which shows that each rejects a density wrong by 2 %.
+// Directions are binned in (theta, phi) about the x axis: theta = asin(x), phi = atan2(z, y), the
+// fiber frame. A window zooms in on narrow lobes; what falls outside is one more cell. Both a
+// coarse and a fine grid are tested: a fine grid alone hides a density that is 2 % wrong, a coarse
+// one hides structure. The Sidak correction keeps the chance of a false alarm of a whole family of
+// tests at kSignificance. Tested in tests/math/statistics_test.cpp, which shows that each rejects a
+// density wrong by 2 %.
 
 #include <algorithm>
 #include <cmath>
@@ -24,8 +25,8 @@ namespace heddle {
 
 inline constexpr double kSignificance = 0.01;
 
-/// Probability that a chi-square variable with that many degrees of freedom exceeds `statistic`: the
-/// regularised upper incomplete gamma function, by its series or its continued fraction.
+/// Probability that a chi-square variable with that many degrees of freedom exceeds `statistic`:
+/// the regularised upper incomplete gamma function, by its series or its continued fraction.
 inline double chi_square_tail(double statistic, int degrees) {
   const double a = 0.5 * degrees;
   const double x = 0.5 * statistic;
@@ -66,8 +67,10 @@ struct ChiSquareResult {
   double p_value;
 };
 
-/// Pearson's statistic; cells that expect less than 5 are pooled, smallest first, until the pool expects 5.
-inline ChiSquareResult chi_square(const std::vector<double>& expected, const std::vector<double>& observed) {
+/// Pearson's statistic; cells that expect less than 5 are pooled, smallest first, until the pool
+/// expects 5.
+inline ChiSquareResult chi_square(const std::vector<double>& expected,
+                                  const std::vector<double>& observed) {
   std::vector<std::size_t> order(expected.size());
   for (std::size_t k = 0; k < order.size(); ++k) order[k] = k;
   std::sort(order.begin(), order.end(),
@@ -84,8 +87,8 @@ inline ChiSquareResult chi_square(const std::vector<double>& expected, const std
     pool_expected = pool_observed = 0.0;
     ++cells;
   }
-  // What is left expects less than 5 because everything does; a sample where nearly none may fall is an error
-  // all the same.
+  // What is left expects less than 5 because everything does; a sample where nearly none may fall
+  // is an error all the same.
   if (pool_observed > 50.0) statistic += 1e9;
   const int degrees = std::max(1, cells - 1);
   return {statistic, degrees, chi_square_tail(statistic, degrees)};
@@ -98,12 +101,12 @@ struct AngleWindow {
   double phi_max = kPi;
 };
 
-/// Chi-square test of `sample` against `density` (1/sr) with `count` samples, on 10 x 20 and 40 x 80 cells of
-/// the window. `tests` is the number of calls in the family. Prints both statistics; true when neither
-/// rejects.
+/// Chi-square test of `sample` against `density` (1/sr) with `count` samples, on 10 x 20 and 40 x
+/// 80 cells of the window. `tests` is the number of calls in the family. Prints both statistics;
+/// true when neither rejects.
 inline bool chi_square_accepts(const std::string& name, const std::function<Vec3d()>& sample,
-                               const std::function<double(const Vec3d&)>& density, int count, int tests = 1,
-                               const AngleWindow& window = {}) {
+                               const std::function<double(const Vec3d&)>& density, int count,
+                               int tests = 1, const AngleWindow& window = {}) {
   std::vector<double> thetas;
   std::vector<double> phis;
   for (int k = 0; k < count; ++k) {
@@ -126,11 +129,11 @@ inline bool chi_square_accepts(const std::string& name, const std::function<Vec3
     const int nodes = scale == 1 ? 16 : 6;
     double inside = 0.0;
     for (int r = 0; r < rows; ++r) {
-      const QuadratureRule theta_rule =
-          gauss_legendre(nodes, window.theta_min + r * row_height, window.theta_min + (r + 1) * row_height);
+      const QuadratureRule theta_rule = gauss_legendre(nodes, window.theta_min + r * row_height,
+                                                       window.theta_min + (r + 1) * row_height);
       for (int c = 0; c < columns; ++c) {
-        const QuadratureRule phi_rule =
-            gauss_legendre(nodes, window.phi_min + c * column_width, window.phi_min + (c + 1) * column_width);
+        const QuadratureRule phi_rule = gauss_legendre(nodes, window.phi_min + c * column_width,
+                                                       window.phi_min + (c + 1) * column_width);
         const double share = integrate(theta_rule, [&](double theta) {
           return std::cos(theta) * integrate(phi_rule, [&](double phi) {
                    return density(Vec3d(std::sin(theta), std::cos(theta) * std::cos(phi),
@@ -153,9 +156,10 @@ inline bool chi_square_accepts(const std::string& name, const std::function<Vec3
     const double significance = sidak_significance(2 * tests);
     const bool grid_accepts = result.p_value > significance && inside < 1.0 + 1e-3;
     std::printf(
-        "  chi-square %-34s %2d x %2d: %9.1f, %4d degrees, p = %.3g (limit %.3g), window holds %.5f%s\n",
-        name.c_str(), rows, columns, result.statistic, result.degrees, result.p_value, significance, inside,
-        grid_accepts ? "" : "  REJECTED");
+        "  chi-square %-34s %2d x %2d: %9.1f, %4d degrees, p = %.3g (limit %.3g), window holds "
+        "%.5f%s\n",
+        name.c_str(), rows, columns, result.statistic, result.degrees, result.p_value, significance,
+        inside, grid_accepts ? "" : "  REJECTED");
     accepted = accepted && grid_accepts;
   }
   return accepted;
@@ -182,18 +186,20 @@ class RunningMean {
   double squares_ = 0.0;
 };
 
-/// True when two means agree within the Sidak-corrected two-sided limit of a family of `tests`; an exact
-/// value has standard error 0. Prints the number of standard errors between them.
-inline bool means_agree(const std::string& name, double mean_a, double standard_error_a, double mean_b,
-                        double standard_error_b, int tests = 1) {
+/// True when two means agree within the Sidak-corrected two-sided limit of a family of `tests`; an
+/// exact value has standard error 0. Prints the number of standard errors between them.
+inline bool means_agree(const std::string& name, double mean_a, double standard_error_a,
+                        double mean_b, double standard_error_b, int tests = 1) {
   const double standard_error = std::hypot(standard_error_a, standard_error_b);
-  const double z = standard_error > 0.0 ? (mean_a - mean_b) / standard_error : (mean_a == mean_b ? 0.0 : 1e9);
+  const double z =
+      standard_error > 0.0 ? (mean_a - mean_b) / standard_error : (mean_a == mean_b ? 0.0 : 1e9);
   const double p_value = std::erfc(std::abs(z) / std::sqrt(2.0));
   const bool agree = p_value > sidak_significance(tests);
   std::printf(
-      "  z-test %-38s %.6g +- %.2g against %.6g +- %.2g: %+.2f standard errors, p = %.3g (limit %.3g)%s\n",
-      name.c_str(), mean_a, standard_error_a, mean_b, standard_error_b, z, p_value, sidak_significance(tests),
-      agree ? "" : "  REJECTED");
+      "  z-test %-38s %.6g +- %.2g against %.6g +- %.2g: %+.2f standard errors, p = %.3g (limit "
+      "%.3g)%s\n",
+      name.c_str(), mean_a, standard_error_a, mean_b, standard_error_b, z, p_value,
+      sidak_significance(tests), agree ? "" : "  REJECTED");
   return agree;
 }
 

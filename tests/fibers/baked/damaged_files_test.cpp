@@ -1,4 +1,5 @@
-// Files of precomputed data with damaged bytes: refused, or data that can be asked without leaving their arrays.
+// Files of precomputed data with damaged bytes: refused, or data that can be asked without leaving
+// their arrays.
 
 #include <gtest/gtest.h>
 
@@ -51,7 +52,8 @@ TEST_F(DamagedFilesFormat, SignedDistances) {
   damage([&](const auto& path) { write_ssdf(path, ssdf, {}); },
          [](const auto& path) {
            const SsdfVisibility read = read_ssdf(path);
-           for (std::uint32_t s = 0; s < read.sees_nothing.size(); ++s) read.signed_distance(s, Vec3(0, 0.6F, -0.8F));
+           for (std::uint32_t s = 0; s < read.sees_nothing.size(); ++s)
+             read.signed_distance(s, Vec3(0, 0.6F, -0.8F));
          });
 }
 
@@ -83,13 +85,18 @@ TEST_F(DamagedFilesFormat, Transfer) {
            const auto n = static_cast<std::size_t>(read.coefficients());
            const std::vector<float> light(n, 1);
            std::vector<float> result(3 * n);
-           for (const std::uint32_t cell : read.cell_of_segment) read.incoming(cell, light.data(), result.data());
+           for (const std::uint32_t cell : read.cell_of_segment)
+             read.incoming(cell, light.data(), result.data());
          });
 }
 
 TEST_F(DamagedFilesFormat, NoManifestIsReadThatWasChanged) {
   write_bytes(folder_.path() / "fibers.safetensors", "fibers");
-  PackManifest manifest{.name = "n", .key = "k", .program_version = "v", .light_from_both_sides = false, .counts = {{"fibers", 3}},
+  PackManifest manifest{.name = "n",
+                        .key = "k",
+                        .program_version = "v",
+                        .light_from_both_sides = false,
+                        .counts = {{"fibers", 3}},
                         .files = {{"fibers.safetensors", {}}}};
   write_manifest(folder_.path(), manifest);
   const std::filesystem::path path = folder_.path() / kManifestName;
@@ -103,7 +110,8 @@ TEST_F(DamagedFilesFormat, NoManifestIsReadThatWasChanged) {
       EXPECT_EQ(read.name + read.key + read.program_version, "nkv") << damaged;
       EXPECT_EQ(read.counts, manifest.counts) << damaged;
     } catch (const FileError& error) {
-      EXPECT_NE(std::string(error.what()).find(folder_.path().string()), std::string::npos) << error.what();
+      EXPECT_NE(std::string(error.what()).find(folder_.path().string()), std::string::npos)
+          << error.what();
     }
   });
 }

@@ -58,7 +58,8 @@ TEST_F(FabricPackFormat, NamesOutsideThePackAreRefused) {
   // Files that exist, with sizes and checksums that are right: only the names tell.
   const std::filesystem::path folder = folder_.path() / "sub.pack";
   std::filesystem::create_directories(folder / "below");
-  for (const char* name : {"../fibers.safetensors", "below/fibers.safetensors", "extra.safetensors"}) {
+  for (const char* name :
+       {"../fibers.safetensors", "below/fibers.safetensors", "extra.safetensors"}) {
     std::filesystem::copy_file(folder_.path() / "fibers.safetensors", folder / "fibers.safetensors",
                                std::filesystem::copy_options::overwrite_existing);
     if (!std::filesystem::exists(folder / name))
@@ -70,17 +71,19 @@ TEST_F(FabricPackFormat, NamesOutsideThePackAreRefused) {
       load_pack(folder);
       ADD_FAILURE() << name << " was opened";
     } catch (const FileError& error) {
-      EXPECT_NE(std::string(error.what()).find("no part of a pack"), std::string::npos) << error.what();
+      EXPECT_NE(std::string(error.what()).find("no part of a pack"), std::string::npos)
+          << error.what();
     }
   }
 }
 
 TEST_F(FabricPackFormat, EveryChangeOfTheManifestIsSeen) {
-  for (const auto& [from, to] : std::vector<std::pair<std::string, std::string>>{{"crossed", "crosses"},
-                                                                                 {"00ff", "00fe"},
-                                                                                 {"1.2.3", "1.2.4"},
-                                                                                 {"\"both\"", "\"face\""},
-                                                                                 {"\"fibers\": 8", "\"fibers\": 9"}}) {
+  for (const auto& [from, to] :
+       std::vector<std::pair<std::string, std::string>>{{"crossed", "crosses"},
+                                                        {"00ff", "00fe"},
+                                                        {"1.2.3", "1.2.4"},
+                                                        {"\"both\"", "\"face\""},
+                                                        {"\"fibers\": 8", "\"fibers\": 9"}}) {
     write_manifest(folder_.path(), manifest_);
     replace_in_manifest(from, to);
     EXPECT_NE(refusal().find("manifest.json"), std::string::npos) << from;
@@ -113,17 +116,20 @@ TEST_F(FabricPackFormat, MissingTruncatedAndFlippedFilesAreNamed) {
 
 TEST_F(FabricPackFormat, DeeplyNestedManifestsAreRefusedByName) {
   for (const std::size_t depth : {65, 70'000, 250'000}) {
-    const std::string text = "{\"format\": \"heddle pack\", \"version\": 1, \"x\": " + std::string(depth, '[') +
-                             std::string(depth, ']') + ", \"manifest_xxh3_128\": \"x\"}";
+    const std::string text =
+        "{\"format\": \"heddle pack\", \"version\": 1, \"x\": " + std::string(depth, '[') +
+        std::string(depth, ']') + ", \"manifest_xxh3_128\": \"x\"}";
     write_file_atomically(folder_.path() / kManifestName, text);
-    EXPECT_NE(refusal().find("manifest.json: not a pack manifest: JSON nested deeper than 64"), std::string::npos)
+    EXPECT_NE(refusal().find("manifest.json: not a pack manifest: JSON nested deeper than 64"),
+              std::string::npos)
         << refusal();
   }
 }
 
 TEST_F(FabricPackFormat, ManifestsThatAreNone) {
   for (const char* text :
-       {"", "{", "[]", "null", "{}", "{\"format\": 3}", "{\"format\": \"heddle pack\", \"version\": 1}",
+       {"", "{", "[]", "null", "{}", "{\"format\": 3}",
+        "{\"format\": \"heddle pack\", \"version\": 1}",
         "{\"format\": \"heddle pack\", \"version\": 1, \"manifest_xxh3_128\": []}"}) {
     write_file_atomically(folder_.path() / kManifestName, std::string_view(text));
     EXPECT_NE(refusal().find("manifest"), std::string::npos) << text;

@@ -27,7 +27,9 @@ SsdfVisibility empty_ssdf(int resolution, int components, std::size_t segments) 
 Vec3 centre(int resolution, int row, int column) {
   const double polar = (row + 0.5) * kPi / resolution;
   const double azimuth = (column + 0.5) * 2 * kPi / resolution;
-  return Vec3d(std::sin(polar) * std::cos(azimuth), std::sin(polar) * std::sin(azimuth), std::cos(polar)).cast<float>();
+  return Vec3d(std::sin(polar) * std::cos(azimuth), std::sin(polar) * std::sin(azimuth),
+               std::cos(polar))
+      .cast<float>();
 }
 
 TEST(SsdfVisibility, MeanAndComponentsAtCellCentres) {
@@ -43,9 +45,10 @@ TEST(SsdfVisibility, MeanAndComponentsAtCellCentres) {
   for (int row = 0; row < n; ++row) {
     for (int column = 0; column < n; ++column) {
       const auto i = static_cast<std::size_t>(row * n + column);
-      const float expected =
-          ssdf.mean[i] + 0.5F * ssdf.basis[3 * i] - 0.25F * ssdf.basis[3 * i + 1] + 2 * ssdf.basis[3 * i + 2];
-      EXPECT_NEAR(ssdf.signed_distance(1, centre(n, row, column)), expected, 2e-4) << row << " " << column;
+      const float expected = ssdf.mean[i] + 0.5F * ssdf.basis[3 * i] -
+                             0.25F * ssdf.basis[3 * i + 1] + 2 * ssdf.basis[3 * i + 2];
+      EXPECT_NEAR(ssdf.signed_distance(1, centre(n, row, column)), expected, 2e-4)
+          << row << " " << column;
     }
   }
 }
@@ -60,18 +63,21 @@ TEST(SsdfVisibility, EveryFiniteHalfIsACoefficient) {
   ssdf.coefficients = finite;
   for (std::uint32_t s = 0; s < finite.size(); ++s) {
     const float expected = float_from_half(finite[s]);
-    ASSERT_NEAR(ssdf.signed_distance(s, Vec3(0, 1, 0)), expected, 1e-6F * std::abs(expected)) << finite[s].bits;
+    ASSERT_NEAR(ssdf.signed_distance(s, Vec3(0, 1, 0)), expected, 1e-6F * std::abs(expected))
+        << finite[s].bits;
   }
 }
 
-// A smooth function comes back with the error of bilinear interpolation: at most (step^2 / 8) times its second derivative
-// per axis; z has no more than 1 along the polar angle, x no more than 1 along either. Poles and wrap included.
+// A smooth function comes back with the error of bilinear interpolation: at most (step^2 / 8) times
+// its second derivative per axis; z has no more than 1 along the polar angle, x no more than 1
+// along either. Poles and wrap included.
 TEST(SsdfVisibilityLaw, InterpolatesSmoothFunctions) {
   const int n = 32;
   const double bound = (kPi / n) * (kPi / n) / 8 + (2 * kPi / n) * (2 * kPi / n) / 8;
   for (int axis = 0; axis < 3; ++axis) {
     SsdfVisibility ssdf = empty_ssdf(n, 1, 1);
-    for (int i = 0; i < n * n; ++i) ssdf.mean[static_cast<std::size_t>(i)] = centre(n, i / n, i % n)[axis];
+    for (int i = 0; i < n * n; ++i)
+      ssdf.mean[static_cast<std::size_t>(i)] = centre(n, i / n, i % n)[axis];
     for (std::uint64_t i = 0; i < 5000; ++i) {
       RandomStream random(1, RandomStage::kTest, 0, i);
       Vec3 w = sample_sphere(random);
@@ -99,7 +105,8 @@ class SegmentVisibilityFormat : public testing::Test {
     SgVisibility sgs;
     sgs.sharpness = 40;
     sgs.axes = {Vec3(0, 0, 1), Vec3(0.6F, 0, 0.8F)};
-    sgs.weights = {half_from_float(0.5F), half_from_float(0), half_from_float(1), half_from_float(0.25F)};
+    sgs.weights = {half_from_float(0.5F), half_from_float(0), half_from_float(1),
+                   half_from_float(0.25F)};
     sgs.rotation = {half_from_float(1), half_from_float(2)};
     sgs.sees_nothing = {0, 1};
     return sgs;

@@ -34,7 +34,8 @@ TEST(TransferLaw, IncomingSumsOverTheLightIndex) {
   for (std::size_t j1 = 0; j1 < 9; ++j1) {
     for (std::size_t c = 0; c < 3; ++c) {
       double sum = 0;
-      for (std::size_t j0 = 0; j0 < 9; ++j0) sum += t.matrices[((5 * 9 + j0) * 9 + j1) * 3 + c] * light[j0];
+      for (std::size_t j0 = 0; j0 < 9; ++j0)
+        sum += t.matrices[((5 * 9 + j0) * 9 + j1) * 3 + c] * light[j0];
       EXPECT_NEAR(result[3 * j1 + c], sum, 1e-5);
     }
   }
@@ -45,7 +46,8 @@ Transfer random_transfer_with_cones() {
   Transfer t = random_transfer();
   RandomStream random(1, RandomStage::kTest, 22, 0);
   t.cones.emplace();
-  for (std::size_t i = 0; i < t.matrices.size(); ++i) t.cones->harmonics.push_back(random.uniform() - 0.5F);
+  for (std::size_t i = 0; i < t.matrices.size(); ++i)
+    t.cones->harmonics.push_back(random.uniform() - 0.5F);
   for (std::size_t i = 0; i < 8 * ConeTransfer::kWidths * 9 * ConeTransfer::kAzimuths * 3; ++i) {
     t.cones->moments.push_back(random.uniform() - 0.5F);
   }
@@ -64,27 +66,32 @@ TEST(TransferLaw, ConesLeaveTheHarmonicsByTheirShare) {
   t.incoming_on_cones(5, light.data(), cones.data());
   for (std::size_t k = 0; k < 27; ++k) {
     double sum = 0;
-    for (std::size_t j0 = 0; j0 < 9; ++j0) sum += t.cones->harmonics[(5 * 9 + j0) * 27 + k] * light[j0];
+    for (std::size_t j0 = 0; j0 < 9; ++j0)
+      sum += t.cones->harmonics[(5 * 9 + j0) * 27 + k] * light[j0];
     EXPECT_NEAR(less[k], whole[k] - 0.75 * sum, 1e-5);
   }
   constexpr std::size_t kRow = ConeTransfer::kAzimuths * 3;
   for (std::size_t k = 0; k < cones.size(); ++k) {
     double sum = 0;
     for (std::size_t j0 = 0; j0 < 9; ++j0) {
-      sum += t.cones->moments[((5 * ConeTransfer::kWidths + k / kRow) * 9 + j0) * kRow + k % kRow] * light[j0];
+      sum += t.cones->moments[((5 * ConeTransfer::kWidths + k / kRow) * 9 + j0) * kRow + k % kRow] *
+             light[j0];
     }
     EXPECT_NEAR(cones[k], sum, 1e-5);
   }
 }
 
 TEST(ConeTransferLaw, WidthsFollowTheLimits) {
-  const auto variance = [](double degrees) { return static_cast<float>(std::pow(degrees * kPi / 180, 2)); };
+  const auto variance = [](double degrees) {
+    return static_cast<float>(std::pow(degrees * kPi / 180, 2));
+  };
   EXPECT_EQ(ConeTransfer::width_of(0), 0);
   for (int width = 0; width < ConeTransfer::kWidths; ++width) {
     const double limit = ConeTransfer::kLimitDegrees[static_cast<std::size_t>(width)];
     EXPECT_EQ(ConeTransfer::width_of(variance(limit * 0.999)), width);
     EXPECT_EQ(ConeTransfer::width_of(variance(limit * 1.001)), width + 1);
-    EXPECT_NEAR(ConeTransfer::variance_of(width), variance(ConeTransfer::kDeviationDegrees[static_cast<std::size_t>(width)]), 1e-6);
+    EXPECT_NEAR(ConeTransfer::variance_of(width),
+                variance(ConeTransfer::kDeviationDegrees[static_cast<std::size_t>(width)]), 1e-6);
   }
 }
 
@@ -93,17 +100,21 @@ TEST(ConeTransferLaw, AzimuthHarmonicsAreOrthonormal) {
   Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(ConeTransfer::kAzimuths, ConeTransfer::kAzimuths);
   for (int k = 0; k < kPoints; ++k) {
     const double azimuth = 2 * kPi * k / kPoints;
-    const auto values = azimuth_harmonics(static_cast<float>(std::cos(azimuth)), static_cast<float>(std::sin(azimuth)));
+    const auto values = azimuth_harmonics(static_cast<float>(std::cos(azimuth)),
+                                          static_cast<float>(std::sin(azimuth)));
     const Eigen::Map<const Eigen::VectorXf> row(values.data(), ConeTransfer::kAzimuths);
     gram += (row * row.transpose()).cast<double>() * (2 * kPi / kPoints);
   }
-  EXPECT_LT((gram - Eigen::MatrixXd::Identity(gram.rows(), gram.cols())).cwiseAbs().maxCoeff(), 1e-6);
+  EXPECT_LT((gram - Eigen::MatrixXd::Identity(gram.rows(), gram.cols())).cwiseAbs().maxCoeff(),
+            1e-6);
 }
 
 TEST(ConeTransferLaw, FramesAreRotationsAboutTheBundle) {
   RandomStream random(1, RandomStage::kTest, 23, 0);
   for (int i = 0; i < 200; ++i) {
-    const Vec3 tangent = i == 0 ? Vec3(Vec3::UnitZ()) : i == 1 ? Vec3(-Vec3::UnitZ()) : sample_sphere(random);
+    const Vec3 tangent = i == 0   ? Vec3(Vec3::UnitZ())
+                         : i == 1 ? Vec3(-Vec3::UnitZ())
+                                  : sample_sphere(random);
     const Mat3 axes = cone_frame(tangent);
     EXPECT_LT((axes * axes.transpose() - Mat3::Identity()).norm(), 1e-5F);
     EXPECT_NEAR(axes.determinant(), 1, 1e-5);
@@ -154,7 +165,8 @@ TEST(CutToOrder, KeepsTheLowBands) {
   transfer.cones.emplace();
   constexpr std::size_t kOnCones = ConeTransfer::kWidths * ConeTransfer::kAzimuths * 3;
   transfer.cones->harmonics = transfer.matrices;
-  for (std::size_t k = 0; k < 2 * 16 * kOnCones; ++k) transfer.cones->moments.push_back(static_cast<float>(k % 89));
+  for (std::size_t k = 0; k < 2 * 16 * kOnCones; ++k)
+    transfer.cones->moments.push_back(static_cast<float>(k % 89));
   const Transfer cut = cut_to_order(transfer, 1);
   EXPECT_EQ(cut.order, 1);
   EXPECT_EQ(cut.matrices.size(), 2U * 4 * 4 * 3);
@@ -175,7 +187,8 @@ TEST(CutToOrder, KeepsTheLowBands) {
     std::vector<float> low_cones(kOnCones);
     transfer.incoming_on_cones(cell, light.data(), whole_cones.data());
     cut.incoming_on_cones(cell, light.data(), low_cones.data());
-    for (std::size_t k = 0; k < kOnCones; ++k) EXPECT_FLOAT_EQ(low_cones[k], whole_cones[k]) << cell;
+    for (std::size_t k = 0; k < kOnCones; ++k)
+      EXPECT_FLOAT_EQ(low_cones[k], whole_cones[k]) << cell;
   }
 }
 

@@ -45,18 +45,21 @@ TEST(BundleTangentsLaw, WanderAveragesOut) {
     own += (exemplar.segment_tangent(s) - Vec3::UnitX()).squaredNorm();
     of_bundle += (mean[s] - Vec3::UnitX()).squaredNorm();
   }
-  // Midpoints within 0.02 mm are those of 9 fibers (5 at the ends of the grid), one to three segments each: independent
-  // wander falls to a ninth (a fifth) in variance, and a little less where segments of one fiber, which share points, cancel.
+  // Midpoints within 0.02 mm are those of 9 fibers (5 at the ends of the grid), one to three
+  // segments each: independent wander falls to a ninth (a fifth) in variance, and a little less
+  // where segments of one fiber, which share points, cancel.
   EXPECT_LT(of_bundle, own / 4);
   EXPECT_GT(of_bundle, own / 60);
-  EXPECT_NEAR(bundle_spread(exemplar, mean), std::sqrt(own / static_cast<double>(mean.size())), 0.2 * std::sqrt(own / static_cast<double>(mean.size())));
+  EXPECT_NEAR(bundle_spread(exemplar, mean), std::sqrt(own / static_cast<double>(mean.size())),
+              0.2 * std::sqrt(own / static_cast<double>(mean.size())));
 }
 
 TEST(BundleTangentsLaw, DirectionAndPlaceOnThePeriodDoNotMatter) {
   // Every other fiber runs backwards; their bundles are the same lines.
   Exemplar turned = straight_bundle();
   for (std::size_t f = 0; f + 1 < turned.first_point.size(); f += 2) {
-    std::reverse(turned.points.begin() + turned.first_point[f], turned.points.begin() + turned.first_point[f + 1]);
+    std::reverse(turned.points.begin() + turned.first_point[f],
+                 turned.points.begin() + turned.first_point[f + 1]);
   }
   RandomStream random(3, RandomStage::kTest, 2, 0);
   for (Vec3& point : turned.points) point.tail<2>() += 0.002F * sample_disk(random);
@@ -76,7 +79,8 @@ TEST(BundleTangents, FibersThatCrossDoNotCount) {
   Exemplar exemplar = straight_bundle();
   const std::vector<Vec3> alone = bundle_tangents(exemplar);
   // A fiber across all others, just over them.
-  for (int k = 0; k <= 8; ++k) exemplar.points.emplace_back(0.2F, 0.096F * static_cast<float>(k) / 8, 0.058F);
+  for (int k = 0; k <= 8; ++k)
+    exemplar.points.emplace_back(0.2F, 0.096F * static_cast<float>(k) / 8, 0.058F);
   exemplar.first_point.push_back(static_cast<std::uint32_t>(exemplar.points.size()));
   exemplar.radius_mm.push_back(kRadius);
   exemplar.material.push_back(0);
@@ -96,8 +100,10 @@ std::vector<Vec3> bundle_tangents_of_all_pairs(const Exemplar& exemplar) {
       apart.x() -= exemplar.width_mm * std::round(apart.x() / exemplar.width_mm);
       apart.y() -= exemplar.height_mm * std::round(apart.y() / exemplar.height_mm);
       const float cosine = exemplar.segment_tangent(other).dot(exemplar.segment_tangent(s));
-      const bool counts = other != s && apart.norm() <= 4 * exemplar.radius_mm[exemplar.segment_fiber[s]];
-      if (counts && std::abs(cosine) >= 0.9F) sum += (cosine > 0 ? 1.0F : -1.0F) * exemplar.segment_tangent(other);
+      const bool counts =
+          other != s && apart.norm() <= 4 * exemplar.radius_mm[exemplar.segment_fiber[s]];
+      if (counts && std::abs(cosine) >= 0.9F)
+        sum += (cosine > 0 ? 1.0F : -1.0F) * exemplar.segment_tangent(other);
     }
     mean.push_back(sum.normalized());
   }
@@ -107,7 +113,8 @@ std::vector<Vec3> bundle_tangents_of_all_pairs(const Exemplar& exemplar) {
 void expect_means_of_all_pairs(const Exemplar& exemplar) {
   const std::vector<Vec3> mean = bundle_tangents(exemplar);
   const std::vector<Vec3> expected = bundle_tangents_of_all_pairs(exemplar);
-  for (std::uint32_t s = 0; s < exemplar.segment_count(); ++s) ASSERT_LT((mean[s] - expected[s]).norm(), 1e-5F) << s;
+  for (std::uint32_t s = 0; s < exemplar.segment_count(); ++s)
+    ASSERT_LT((mean[s] - expected[s]).norm(), 1e-5F) << s;
 }
 
 TEST(BundleTangentsAgreement, ColumnsFindWhatAllPairsFind) {

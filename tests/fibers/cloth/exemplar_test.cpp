@@ -34,8 +34,10 @@ TEST(ExemplarFormat, RoundTripKeepsEveryBit) {
 }
 
 TEST(ExemplarFormat, EachBrokenInvariantIsNamed) {
-  Exemplar good = test::straight_fibers(1, 1, {{0.3F, 0}, {0.6F, 0.1F}}, 0.02F, 4, test::white_fiber());
-  good.scattering.push_back({Rgbd(0, 0.5, 1), Rgbd(0, 0.5, 1), radians(0.1), radians(60), radians(180)});
+  Exemplar good =
+      test::straight_fibers(1, 1, {{0.3F, 0}, {0.6F, 0.1F}}, 0.02F, 4, test::white_fiber());
+  good.scattering.push_back(
+      {Rgbd(0, 0.5, 1), Rgbd(0, 0.5, 1), radians(0.1), radians(60), radians(180)});
   EXPECT_NO_THROW(validate_exemplar(good, "good"));
   const std::vector<std::pair<int, std::function<void(Exemplar&)>>> breakages = {
       {1, [](Exemplar& e) { e.first_point[1] = 2; }},
@@ -47,8 +49,14 @@ TEST(ExemplarFormat, EachBrokenInvariantIsNamed) {
       {2, [](Exemplar& e) { e.radius_mm[1] = 1e-30F; }},
       {2, [](Exemplar& e) { e.width_mm = -1; }},
       {2, [](Exemplar& e) { e.height_mm = 1e30F; }},
-      {2, [](Exemplar& e) { for (Vec3& p : e.points) p.x() += 2; }},
-      {2, [](Exemplar& e) { for (Vec3& p : e.points) p.y() -= 2; }},
+      {2,
+       [](Exemplar& e) {
+         for (Vec3& p : e.points) p.x() += 2;
+       }},
+      {2,
+       [](Exemplar& e) {
+         for (Vec3& p : e.points) p.y() -= 2;
+       }},
       {2, [](Exemplar& e) { e.points[2].x() = 1e30F; }},
       {2, [](Exemplar& e) { e.points[2].y() = -4e9F; }},
       {2, [](Exemplar& e) { e.points[2].z() = 1e4F; }},
@@ -68,8 +76,9 @@ TEST(ExemplarFormat, EachBrokenInvariantIsNamed) {
       validate_exemplar(bad, "bad.safetensors");
       ADD_FAILURE() << "invariant " << invariant << " was not checked";
     } catch (const FileError& error) {
-      EXPECT_NE(std::string(error.what()).find("bad.safetensors: invariant " + std::to_string(invariant)),
-                std::string::npos)
+      EXPECT_NE(
+          std::string(error.what()).find("bad.safetensors: invariant " + std::to_string(invariant)),
+          std::string::npos)
           << error.what();
     }
   }
@@ -78,21 +87,23 @@ TEST(ExemplarFormat, EachBrokenInvariantIsNamed) {
 TEST(ExemplarFormat, DamagedFilesEndInAnErrorOrInFibersThatRaysCanMeet) {
   const TemporaryFolder folder;
   const std::filesystem::path path = folder.path() / "fibers.safetensors";
-  write_exemplar(path, test::straight_fibers(1, 1, {{0.3F, 0}, {0.6F, 0.1F}}, 0.02F, 4, test_cotton()), {});
+  write_exemplar(
+      path, test::straight_fibers(1, 1, {{0.3F, 0}, {0.6F, 0.1F}}, 0.02F, 4, test_cotton()), {});
   int refused = 0;
   int read = 0;
-  for_each_mutation(bytes_of(path), 3, std::string_view("\0\x7f\xff", 3), [&](const std::string& damaged) {
-    write_bytes(path, damaged);
-    try {
-      const Exemplar exemplar = read_exemplar(path);
-      if (++read % 8 != 0) return;
-      EXPECT_EQ(bundle_tangents(exemplar).size(), exemplar.segment_count());
-      const TileScene scene(exemplar);
-      EXPECT_LT(scene.memory_bytes(), 100'000U);
-    } catch (const FileError&) {
-      ++refused;
-    }
-  });
+  for_each_mutation(bytes_of(path), 3, std::string_view("\0\x7f\xff", 3),
+                    [&](const std::string& damaged) {
+                      write_bytes(path, damaged);
+                      try {
+                        const Exemplar exemplar = read_exemplar(path);
+                        if (++read % 8 != 0) return;
+                        EXPECT_EQ(bundle_tangents(exemplar).size(), exemplar.segment_count());
+                        const TileScene scene(exemplar);
+                        EXPECT_LT(scene.memory_bytes(), 100'000U);
+                      } catch (const FileError&) {
+                        ++refused;
+                      }
+                    });
   EXPECT_GT(refused, 500);
   EXPECT_GT(read, 50);
 }

@@ -27,7 +27,8 @@ TEST(FabricConfig, EachClassOfErrorNamesPlaceAndExpectation) {
   const std::string good = test::small_fabric_toml();
   std::string many_fibers;
   for (int k = 0; k < 64; ++k) {
-    many_fibers += "[fiber.f" + std::to_string(k) + "]\nradius_um = 14\nscattering = \"white-isotropic\"\n";
+    many_fibers +=
+        "[fiber.f" + std::to_string(k) + "]\nradius_um = 14\nscattering = \"white-isotropic\"\n";
   }
   const std::vector<std::array<std::string, 3>> cases = {
       // changed text, replacement, what the message must hold
@@ -74,9 +75,15 @@ TEST(FabricConfig, TilesAreAtMostTenMetres) {
     }
     return std::string();
   };
-  EXPECT_EQ(message("repeats_x", "[warp]").find("fabric.toml:7:1: 'repeats_x': expected a tile of at most 10000 mm, found 10009.6 mm"), 0U)
+  EXPECT_EQ(message("repeats_x", "[warp]")
+                .find("fabric.toml:7:1: 'repeats_x': expected a tile of at most 10000 mm, found "
+                      "10009.6 mm"),
+            0U)
       << message("repeats_x", "[warp]");
-  EXPECT_EQ(message("repeats_y", "[weft]").find("fabric.toml:8:1: 'repeats_y': expected a tile of at most 10000 mm, found 10009.6 mm"), 0U);
+  EXPECT_EQ(message("repeats_y", "[weft]")
+                .find("fabric.toml:8:1: 'repeats_y': expected a tile of at most 10000 mm, found "
+                      "10009.6 mm"),
+            0U);
   EXPECT_EQ(message("repeats_y", "[warp]"), "");
 }
 

@@ -9,7 +9,9 @@
 namespace heddle {
 namespace {
 
-YarnPath flat_yarn(double length_mm) { return {false, 0.5, length_mm / 4, 4, {0, 0, 0, 0}}; }
+YarnPath flat_yarn(double length_mm) {
+  return {false, 0.5, length_mm / 4, 4, {0, 0, 0, 0}};
+}
 
 YarnConfig yarn_of(int plies, int fibers, double wander_deg) {
   YarnConfig yarn;
@@ -22,7 +24,8 @@ YarnConfig yarn_of(int plies, int fibers, double wander_deg) {
   return yarn;
 }
 
-Exemplar fibers_of(const YarnConfig& yarn, double length_mm, double segment_mm, std::uint64_t seed = 1) {
+Exemplar fibers_of(const YarnConfig& yarn, double length_mm, double segment_mm,
+                   std::uint64_t seed = 1) {
   Exemplar exemplar;
   exemplar.width_mm = static_cast<float>(length_mm);
   exemplar.height_mm = 1;
@@ -41,7 +44,8 @@ TEST(FibersOfYarnLaw, NoFiberLeavesItsYarn) {
     yarn.migration = 0.5;
     const Exemplar exemplar = fibers_of(yarn, 3, 0.02);
     for (const Vec3& p : exemplar.points) {
-      const double across = std::hypot((p.y() - 0.5) / (0.5 * yarn.width_mm - 0.005), p.z() / (0.5 * yarn.height_mm - 0.005));
+      const double across = std::hypot((p.y() - 0.5) / (0.5 * yarn.width_mm - 0.005),
+                                       p.z() / (0.5 * yarn.height_mm - 0.005));
       EXPECT_LE(across, 1 + 1e-4) << plies;
     }
   }
@@ -56,7 +60,8 @@ TEST(FibersOfYarnLaw, EveryFiberContinuesInTheNextTile) {
   EXPECT_NO_THROW(validate_exemplar(exemplar, "fibers"));
 }
 
-// A twist of whole turns: a helix of radius R and N turns over length L climbs at atan(2 pi R N / L).
+// A twist of whole turns: a helix of radius R and N turns over length L climbs at atan(2 pi R N /
+// L).
 TEST(FibersOfYarnLaw, TwistGivesTheAngleOfAHelix) {
   YarnConfig yarn = yarn_of(1, 400, 0);
   yarn.width_mm = yarn.height_mm = 0.4;
@@ -71,8 +76,8 @@ TEST(FibersOfYarnLaw, TwistGivesTheAngleOfAHelix) {
   }
 }
 
-// Slopes are sums of modes with the stated rms; the few fibers that meet the yarn's edge are held back there, which can
-// only lower it.
+// Slopes are sums of modes with the stated rms; the few fibers that meet the yarn's edge are held
+// back there, which can only lower it.
 TEST(FibersOfYarnStatistical, WanderHasTheStatedRmsAngle) {
   for (double asked : {1.0, 3.0, 6.0}) {
     YarnConfig yarn = yarn_of(1, 300, asked);
@@ -84,7 +89,8 @@ TEST(FibersOfYarnStatistical, WanderHasTheStatedRmsAngle) {
       const double slope = std::hypot(t.y(), t.z()) / t.x();
       sum += slope * slope;
     }
-    const double measured = degrees(std::atan(std::sqrt(sum / static_cast<double>(exemplar.segment_count()))));
+    const double measured =
+        degrees(std::atan(std::sqrt(sum / static_cast<double>(exemplar.segment_count()))));
     EXPECT_NEAR(measured, asked, 0.05 * asked);
   }
 }

@@ -13,8 +13,10 @@ TEST(SynthesizeLaw, EveryWeaveGivesAValidPeriodicExemplar) {
     const FabricConfig config = test::small_fabric(notation);
     const Exemplar exemplar = synthesize(config);
     EXPECT_NO_THROW(validate_exemplar(exemplar, notation));
-    EXPECT_EQ(exemplar.fiber_count(), 2U * 6U * static_cast<unsigned>(config.weave.ends + config.weave.picks));
-    EXPECT_FLOAT_EQ(exemplar.width_mm, static_cast<float>(config.weave.ends * config.warp.spacing_mm));
+    EXPECT_EQ(exemplar.fiber_count(),
+              2U * 6U * static_cast<unsigned>(config.weave.ends + config.weave.picks));
+    EXPECT_FLOAT_EQ(exemplar.width_mm,
+                    static_cast<float>(config.weave.ends * config.warp.spacing_mm));
   }
 }
 
@@ -22,13 +24,16 @@ TEST(SynthesizeLaw, SameConfigSameBits) {
   EXPECT_EQ(synthesize(test::small_fabric()).points, synthesize(test::small_fabric()).points);
 }
 
-// The shipped fabrics: full size where they claim it, small where the quick start and the tests need it.
+// The shipped fabrics: full size where they claim it, small where the quick start and the tests
+// need it.
 TEST(SynthesizeLaw, TheForecastCountsTheSegments) {
   for (const char* notation : {"plain", "twill 3/1", "satin 5/2"}) {
     FabricConfig config = test::small_fabric(notation);
     config.repeats_x = 3;
     config.warp.fibers_per_ply = 5;
-    EXPECT_EQ(forecast_exemplar(config).segments, static_cast<double>(synthesize(config).segment_count())) << notation;
+    EXPECT_EQ(forecast_exemplar(config).segments,
+              static_cast<double>(synthesize(config).segment_count()))
+        << notation;
   }
 }
 
@@ -41,7 +46,8 @@ TEST(SynthesizeLaw, TilesBeyondTheIndicesAreRefused) {
 
 TEST(Synthesize, ShippedFabricsHaveTheSizeTheyClaim) {
   auto summary_of = [](const std::string& name) {
-    const TomlTable document = TomlTable::load(std::string(HEDDLE_SOURCE_DIR) + "/configs/fabrics/" + name);
+    const TomlTable document =
+        TomlTable::load(std::string(HEDDLE_SOURCE_DIR) + "/configs/fabrics/" + name);
     const Exemplar exemplar = synthesize(read_fabric_config(document));
     EXPECT_NO_THROW(validate_exemplar(exemplar, name));
     return summarize(exemplar);

@@ -32,7 +32,8 @@ TEST(WeaveLaw, EachEndAndPickHasTheStatedNumberOfUps) {
 TEST(WeaveLaw, TwillStepsByOneEndPerPick) {
   const Weave twill = parse_weave("twill 2/2", WeaveFace::kWarp);
   for (int pick = 0; pick < 4; ++pick) {
-    for (int end = 0; end < 4; ++end) EXPECT_EQ(twill.is_warp_up(end, pick), twill.is_warp_up(end + 1, pick + 1));
+    for (int end = 0; end < 4; ++end)
+      EXPECT_EQ(twill.is_warp_up(end, pick), twill.is_warp_up(end + 1, pick + 1));
   }
 }
 
@@ -46,7 +47,8 @@ TEST(WeaveLaw, SatinPointsNeverTouch) {
         for (int dp = -1; dp <= 1; ++dp) {
           for (int de = -1; de <= 1; ++de) {
             if (dp == 0 && de == 0) continue;
-            EXPECT_TRUE(satin.is_warp_up(end + de, pick + dp)) << notation << " " << end << "," << pick;
+            EXPECT_TRUE(satin.is_warp_up(end + de, pick + dp))
+                << notation << " " << end << "," << pick;
           }
         }
       }
@@ -61,8 +63,9 @@ TEST(WeaveLaw, WeftFaceIsTheComplementOfAWarpFace) {
 }
 
 TEST(Weave, RefusesWhatIsNoWeave) {
-  for (const char* notation : {"", "Plain", "twill", "twill 2", "twill 0/2", "twill 2/-1", "twill 2/2 ", "satin 4/2",
-                               "satin 6/2", "satin 6/3", "satin 8/1", "satin 8/7", "satin 5/2x", "twill 99999999999/1"}) {
+  for (const char* notation :
+       {"", "Plain", "twill", "twill 2", "twill 0/2", "twill 2/-1", "twill 2/2 ", "satin 4/2",
+        "satin 6/2", "satin 6/3", "satin 8/1", "satin 8/7", "satin 5/2x", "twill 99999999999/1"}) {
     EXPECT_THROW(parse_weave(notation, WeaveFace::kWarp), std::invalid_argument) << notation;
   }
 }

@@ -16,7 +16,8 @@ TEST(YarnPathsLaw, NoTwoYarnsOverlapAndTheTightestTouch) {
     // A grid finer than and incommensurate with the one that solved for the crests.
     const double clearance = smallest_clearance(config, paths, 151);
     EXPECT_GE(clearance, 0) << notation;
-    EXPECT_LT(clearance, 0.01 * config.warp.height_mm) << notation << ": the crests are taller than they need to be";
+    EXPECT_LT(clearance, 0.01 * config.warp.height_mm)
+        << notation << ": the crests are taller than they need to be";
   }
 }
 
@@ -44,7 +45,8 @@ TEST(YarnPathsLaw, CrestsDoNotDependOnTheNumberOfRepeats) {
   for (std::size_t end = 0; end < many.warp.size(); ++end) {
     EXPECT_NEAR(many.warp[end].length_mm(), 5 * one.warp[0].length_mm(), 1e-12);
     for (double along = 0; along < many.warp[end].length_mm(); along += 0.0437) {
-      EXPECT_NEAR(many.warp[end].height_at(along), one.warp[end % one.warp.size()].height_at(along), 1e-12);
+      EXPECT_NEAR(many.warp[end].height_at(along), one.warp[end % one.warp.size()].height_at(along),
+                  1e-12);
     }
   }
 }

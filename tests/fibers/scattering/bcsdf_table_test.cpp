@@ -31,7 +31,8 @@ TEST(BcsdfTableAgreement, ValueAgainstTheDefinition) {
     const BcsdfTable table(named.scattering);
     // Float angles are good to 2e-7, which at four deviations changes a Gaussian by 4 / beta * 2e-7
     // relatively; values far below the peak are compared with 1 % of it.
-    const double tolerance = 2e-5 + 1e-6 / std::min(narrowest(named.scattering), named.scattering.gamma_tt);
+    const double tolerance =
+        2e-5 + 1e-6 / std::min(narrowest(named.scattering), named.scattering.gamma_tt);
     for (int k = 0; k < 2000; ++k) {
       const Vec3 wo = sample_sphere(random);
       const Vec3 wi = k % 2 == 0 ? sample_sphere(random) : table.sample(wo, random).wi;
@@ -40,7 +41,8 @@ TEST(BcsdfTableAgreement, ValueAgainstTheDefinition) {
       const Rgbd exact = evaluate_bcsdf(named.scattering, wi.cast<double>().normalized(), wo_exact);
       const Rgbd value = table.evaluate(wi, wo).cast<double>();
       const double peak =
-          evaluate_bcsdf(named.scattering, vector_from({-out.theta, out.phi + kPi}), wo_exact).maxCoeff();
+          evaluate_bcsdf(named.scattering, vector_from({-out.theta, out.phi + kPi}), wo_exact)
+              .maxCoeff();
       const double error = ((value - exact).abs() / (exact + 0.01 * peak + 1e-30)).maxCoeff();
       EXPECT_LT(error, tolerance) << named.name;
       worst = std::max(worst, error / tolerance);
@@ -81,8 +83,8 @@ TEST(BcsdfTableStatistical, SamplesFollowTheDensity) {
       std::snprintf(name, sizeof name, "%s, theta_o %g", c.name, theta_deg);
       EXPECT_TRUE(chi_square_accepts(
           name, [&] { return Vec3d(table.sample(wo, random).wi.cast<double>()); },
-          [&](const Vec3d& wi) { return static_cast<double>(table.pdf(wi.cast<float>(), wo)); }, 100000,
-          kTests, window));
+          [&](const Vec3d& wi) { return static_cast<double>(table.pdf(wi.cast<float>(), wo)); },
+          100000, kTests, window));
     }
   }
 }
@@ -112,7 +114,8 @@ TEST(BcsdfTableLaw, DensityIntegratesToOne) {
       }
       append_geometric_breaks(0.0, std::min(1.0, named.scattering.gamma_tt), kPi, phi_breaks);
       const QuadratureRule phi_rule = gauss_legendre_panels(12, -kPi, kPi, phi_breaks);
-      const QuadratureRule theta_rule = gauss_legendre_panels(12, -0.5 * kPi, 0.5 * kPi, theta_breaks);
+      const QuadratureRule theta_rule =
+          gauss_legendre_panels(12, -0.5 * kPi, 0.5 * kPi, theta_breaks);
       const double total = integrate(theta_rule, [&](double theta) {
         return std::cos(theta) * integrate(phi_rule, [&](double from_peak) {
                  return static_cast<double>(
@@ -140,16 +143,19 @@ TEST(BcsdfTableStatistical, MeanWeightIsTheAdjointAlbedoAndTheWorstIsSmall) {
         Rgb importance(random.uniform(), random.uniform(), random.uniform());
         if (k % 4 == 0) importance[k % 3] = 0.0F;
         const BcsdfTable::Sample sample = table.sample(view(theta_deg), random, importance);
-        ASSERT_TRUE(sample.weight.allFinite() && sample.weight.minCoeff() >= 0.0F && sample.pdf > 0.0F)
+        ASSERT_TRUE(sample.weight.allFinite() && sample.weight.minCoeff() >= 0.0F &&
+                    sample.pdf > 0.0F)
             << named.name;
         mean.add(static_cast<double>(sample.weight[1]));
         worst_here = std::max(worst_here, (importance * sample.weight).sum() / importance.sum());
       }
-      const double albedo = bcsdf_sh(named.scattering, radians(theta_deg), 0)[0][1] * std::sqrt(4.0 * kPi);
+      const double albedo =
+          bcsdf_sh(named.scattering, radians(theta_deg), 0)[0][1] * std::sqrt(4.0 * kPi);
       char name[64];
       std::snprintf(name, sizeof name, "%s, theta_o %g", named.name.c_str(), theta_deg);
       // The tables and float angles are good to 1e-4.
-      EXPECT_TRUE(means_agree(name, mean.mean(), mean.standard_error(), albedo, 1e-4 * albedo + 1e-9, tests));
+      EXPECT_TRUE(means_agree(name, mean.mean(), mean.standard_error(), albedo,
+                              1e-4 * albedo + 1e-9, tests));
       std::printf("    worst weight %.3f\n", static_cast<double>(worst_here));
       worst = std::max(worst, worst_here);
     }
@@ -175,8 +181,8 @@ TEST(BcsdfTableAgreement, SampleReportsItsOwnDensityAndWeight) {
   RandomStream random(6, RandomStage::kTest, 0, 0);
   for (const NamedFiber& named : fibers_for_tests()) {
     const BcsdfTable table(named.scattering);
-    const auto tolerance =
-        static_cast<float>(1e-4 + 3e-6 / std::min(narrowest(named.scattering), named.scattering.gamma_tt));
+    const auto tolerance = static_cast<float>(
+        1e-4 + 3e-6 / std::min(narrowest(named.scattering), named.scattering.gamma_tt));
     for (int k = 0; k < 1000; ++k) {
       const Vec3 wo = sample_sphere(random);
       const BcsdfTable::Sample sample = table.sample(wo, random);
@@ -198,9 +204,10 @@ TEST(BcsdfTableAgreement, HarmonicsAgainstTheDefinition) {
       std::vector<float> row(3 * sh_count(5));
       table.sh_coefficients(static_cast<float>(theta_o), 5, row.data());
       const std::vector<Rgbd> exact = bcsdf_sh(named.scattering, theta_o, 5);
-      // Rows are h = 6.1e-3 rad apart. Harmonics up to band 5 are at most sqrt(11 / 4 pi) = .94 with second
-      // derivatives up to 30 times that: 28 h^2 / 8 = 1.3e-4. Where an end cuts the lobe, values change on
-      // its own scale: (h / beta)^2 / 8 of the changing part, which is at most a tenth.
+      // Rows are h = 6.1e-3 rad apart. Harmonics up to band 5 are at most sqrt(11 / 4 pi) = .94
+      // with second derivatives up to 30 times that: 28 h^2 / 8 = 1.3e-4. Where an end cuts the
+      // lobe, values change on its own scale: (h / beta)^2 / 8 of the changing part, which is at
+      // most a tenth.
       const double beta = narrowest(named.scattering);
       const double spacing = kPi / (BcsdfTable::kRows - 1);
       const bool is_cut = 0.5 * kPi - std::abs(theta_o) < 7.0 * beta + spacing;
@@ -223,15 +230,16 @@ TEST(BcsdfTableAgreement, LightFromSphericalGaussiansAgainstDouble) {
   double worst = 0.0;
   for (const NamedFiber& named : fibers) {
     const BcsdfTable table(named.scattering);
-    // The float angle between light and cone is good to 2e-7, against beta about 10 / beta of it in the
-    // exponent.
+    // The float angle between light and cone is good to 2e-7, against beta about 10 / beta of it in
+    // the exponent.
     const double tolerance = 3e-5 + 3e-6 / narrowest(named.scattering);
     for (const float sharpness : {0.0F, 1e-3F, 1.0F, 7.0F, 8.5F, 48.0F, 150.0F, 1e3F, 1e5F, 1e8F}) {
       for (int k = 0; k < 100; ++k) {
         const Vec3 wo = k == 0 ? Vec3(Vec3::UnitX()) : sample_sphere(random);
         const Vec3 axis = k % 2 == 0 ? sample_sphere(random) : table.sample(wo, random).wi;
         const Rgbd value = table.sg_scatter(axis, sharpness, wo).cast<double>();
-        const SphericalGaussian light{axis.cast<double>().normalized(), static_cast<double>(sharpness)};
+        const SphericalGaussian light{axis.cast<double>().normalized(),
+                                      static_cast<double>(sharpness)};
         const Rgbd exact =
             sg_scatter(named.scattering, light, wo.cast<double>().normalized(), SgMethod::kDefault);
         ASSERT_TRUE(value.allFinite() && value.minCoeff() >= 0.0) << named.name << " " << sharpness;
@@ -261,7 +269,10 @@ TEST(BcsdfTableAgreement, LobesOfGammaComeFromWhereQuadratureSays) {
       const Vec3 axis = vector_from(light).cast<float>();
       const Vec3 wo = vector_from({radians(-25 + gap_deg), light.phi + 2.6}).cast<float>();
       const auto lobes = table.sg_scatter_by_lobe(axis, sharpness, wo);
-      EXPECT_LT((lobes[0].value + lobes[1].value - table.sg_scatter(axis, sharpness, wo)).abs().maxCoeff(), 1e-6F);
+      EXPECT_LT((lobes[0].value + lobes[1].value - table.sg_scatter(axis, sharpness, wo))
+                    .abs()
+                    .maxCoeff(),
+                1e-6F);
       for (std::size_t n = 0; n < 2; ++n) {
         double total = 0;
         double theta = 0;
@@ -272,8 +283,10 @@ TEST(BcsdfTableAgreement, LobesOfGammaComeFromWhereQuadratureSays) {
           for (int k = 0; k < kPhis; ++k) {
             const FiberDirection at = {kPi * ((i + 0.5) / kThetas - 0.5), 2 * kPi * k / kPhis};
             const Vec3d wi = vector_from(at);
-            const double value = sg_value({axis.cast<double>(), sharpness}, wi) * std::cos(at.theta) * std::cos(at.theta) *
-                                 evaluate_bcsdf(fiber, wi, wo.cast<double>(), n == 0 ? Lobe::kR : Lobe::kTt)[0];
+            const double value =
+                sg_value({axis.cast<double>(), sharpness}, wi) * std::cos(at.theta) *
+                std::cos(at.theta) *
+                evaluate_bcsdf(fiber, wi, wo.cast<double>(), n == 0 ? Lobe::kR : Lobe::kTt)[0];
             total += value;
             theta += value * (at.theta - light.theta);
             theta2 += value * (at.theta - light.theta) * (at.theta - light.theta);
@@ -284,14 +297,19 @@ TEST(BcsdfTableAgreement, LobesOfGammaComeFromWhereQuadratureSays) {
         const double scale = kPi / kThetas * 2 * kPi / kPhis;
         const double mean = theta / total;
         const auto& lobe = lobes[n];
-        // Gamma itself errs by .3 % here; deviations are 5 to 9 degrees, so a hundredth of them is 1e-3.
-        EXPECT_NEAR(lobe.value[0] / (total * scale), 1, 0.01) << sharpness << ' ' << gap_deg << ' ' << n;
+        // Gamma itself errs by .3 % here; deviations are 5 to 9 degrees, so a hundredth of them is
+        // 1e-3.
+        EXPECT_NEAR(lobe.value[0] / (total * scale), 1, 0.01)
+            << sharpness << ' ' << gap_deg << ' ' << n;
         EXPECT_NEAR(lobe.theta_shift, mean, 2e-3);
         EXPECT_NEAR(lobe.turn, std::atan2(around_sin, around_cos), 2e-2);
         EXPECT_NEAR(lobe.theta_precision * (theta2 / total - mean * mean), 1, 0.1);
-        // Of a von Mises distribution, 1 - mean cosine about its centre is 1 / (2 k) + 1 / (8 k^2) for large k.
+        // Of a von Mises distribution, 1 - mean cosine about its centre is 1 / (2 k) + 1 / (8 k^2)
+        // for large k.
         const double k_azimuth = lobe.azimuth_precision;
-        EXPECT_NEAR((1 - std::hypot(around_cos, around_sin) / total) / (0.5 / k_azimuth + 0.125 / (k_azimuth * k_azimuth)), 1, 0.1);
+        EXPECT_NEAR((1 - std::hypot(around_cos, around_sin) / total) /
+                        (0.5 / k_azimuth + 0.125 / (k_azimuth * k_azimuth)),
+                    1, 0.1);
       }
     }
   }
@@ -303,7 +321,8 @@ TEST(BcsdfTableAgreement, LightBlurredInInclinationAgainstQuadrature) {
   fibers.push_back({"white", white_isotropic_fiber()});
   double worst = 0;
   for (const NamedFiber& named : fibers) {
-    // Lobes as broad as the range of inclinations are not what this is for; a black fiber's F is Schlick's fifth power alone, 1e-5 of any other's.
+    // Lobes as broad as the range of inclinations are not what this is for; a black fiber's F is
+    // Schlick's fifth power alone, 1e-5 of any other's.
     if (named.name.starts_with("wide") || named.name == "black") continue;
     const BcsdfTable table(named.scattering);
     for (const double deviation : {0.02, 0.06, 0.18}) {
@@ -322,27 +341,35 @@ TEST(BcsdfTableAgreement, LightBlurredInInclinationAgainstQuadrature) {
           for (int c = 0; c < 3; ++c) light(lane, c) = random.uniform();
           const double low = std::max(-kPi / 2, theta_i[lane] - 7 * deviation);
           const double high = std::min(kPi / 2, theta_i[lane] + 7 * deviation);
-          const QuadratureRule rule = gauss_legendre_panels(16, low, high, {-static_cast<double>(theta_o)});
+          const QuadratureRule rule =
+              gauss_legendre_panels(16, low, high, {-static_cast<double>(theta_o)});
           constexpr int kPanels = 24;  // the narrowest lobe is 0.1 degrees wide
           for (int panel = 0; panel < kPanels; ++panel) {
-            const QuadratureRule part = gauss_legendre_panels(16, low + (high - low) * panel / kPanels,
-                                                              low + (high - low) * (panel + 1) / kPanels, {-static_cast<double>(theta_o)});
+            const QuadratureRule part = gauss_legendre_panels(
+                16, low + (high - low) * panel / kPanels,
+                low + (high - low) * (panel + 1) / kPanels, {-static_cast<double>(theta_o)});
             exact += integrate(part, [&](double theta) -> Rgbd {
-              const Vec3d wi(std::sin(theta), std::cos(theta) * std::cos(turn), std::cos(theta) * std::sin(turn));
+              const Vec3d wi(std::sin(theta), std::cos(theta) * std::cos(turn),
+                             std::cos(theta) * std::sin(turn));
               const double off = (theta - theta_i[lane]) / deviation;
               const double density = std::exp(-0.5 * off * off) / (std::sqrt(2 * kPi) * deviation);
-              return light.row(lane).transpose().cast<double>() * evaluate_bcsdf(named.scattering, wi, wo.cast<double>()) *
+              return light.row(lane).transpose().cast<double>() *
+                     evaluate_bcsdf(named.scattering, wi, wo.cast<double>()) *
                      (density * std::cos(theta));
             });
           }
         }
-        const Rgbd got =
-            table.blurred_scatter(theta_i, cos_turn, theta_o, static_cast<float>(deviation * deviation), light).cast<double>();
+        const Rgbd got = table
+                             .blurred_scatter(theta_i, cos_turn, theta_o,
+                                              static_cast<float>(deviation * deviation), light)
+                             .cast<double>();
         ASSERT_TRUE(got.allFinite()) << named.name;
         const double error = (got - exact).abs().maxCoeff() / std::max(exact.maxCoeff(), 1e-12);
-        // What is taken at the mean of the product of Gaussians, cos / Gn and F, bends over the product's width s <= 0.17: cos / Gn
-        // goes like 1 / cos, whose second derivative is below 8 / cos up to 1.1 rad: 8 s^2 / 2 = 0.12 at worst.
-        EXPECT_LT(error, exact.maxCoeff() > 1e-9 ? 0.12 : 1.0) << named.name << ' ' << deviation << ' ' << theta_o;
+        // What is taken at the mean of the product of Gaussians, cos / Gn and F, bends over the
+        // product's width s <= 0.17: cos / Gn goes like 1 / cos, whose second derivative is below 8
+        // / cos up to 1.1 rad: 8 s^2 / 2 = 0.12 at worst.
+        EXPECT_LT(error, exact.maxCoeff() > 1e-9 ? 0.12 : 1.0)
+            << named.name << ' ' << deviation << ' ' << theta_o;
         if (exact.maxCoeff() > 1e-9) worst = std::max(worst, error);
       }
     }

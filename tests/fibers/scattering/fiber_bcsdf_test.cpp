@@ -13,17 +13,19 @@ namespace {
 
 const double kInclinationsDeg[] = {-90, -89.9, -80, -35, 0, 12, 60, 85, 89, 89.99, 90};
 
-// Brute-force integral over directions w of f(w) cos(theta), with panels about the lobes' centre (theta,
-// phi).
+// Brute-force integral over directions w of f(w) cos(theta), with panels about the lobes' centre
+// (theta, phi).
 template <typename Function>
-auto integrate_sphere(const FiberScattering& fiber, double theta_centre, double phi_centre, Function&& f) {
+auto integrate_sphere(const FiberScattering& fiber, double theta_centre, double phi_centre,
+                      Function&& f) {
   std::vector<double> theta_breaks;
   std::vector<double> phi_breaks;
   for (const double beta : {fiber.beta_r, fiber.beta_tt})
     append_geometric_breaks(theta_centre, beta, kPi, theta_breaks);
   append_geometric_breaks(phi_centre, std::min(1.0, fiber.gamma_tt), kPi, phi_breaks);
   const QuadratureRule theta_rule = gauss_legendre_panels(10, -0.5 * kPi, 0.5 * kPi, theta_breaks);
-  const QuadratureRule phi_rule = gauss_legendre_panels(10, phi_centre - kPi, phi_centre + kPi, phi_breaks);
+  const QuadratureRule phi_rule =
+      gauss_legendre_panels(10, phi_centre - kPi, phi_centre + kPi, phi_breaks);
   return integrate(theta_rule, [&](double theta) {
     auto ring = integrate(phi_rule, [&](double phi) { return f(vector_from({theta, phi})); });
     return decltype(ring)(ring * (std::cos(theta) * std::cos(theta)));
@@ -35,7 +37,8 @@ TEST(FiberBcsdfLaw, EnergyIsSchlickPlusTransmission) {
     const FiberScattering& fiber = named.scattering;
     for (const double theta_deg : kInclinationsDeg) {
       const double theta = radians(theta_deg);
-      const Rgbd reflected = fiber.color_r + (1.0 - fiber.color_r) * std::pow(1.0 - std::cos(theta), 5);
+      const Rgbd reflected =
+          fiber.color_r + (1.0 - fiber.color_r) * std::pow(1.0 - std::cos(theta), 5);
       const Rgbd exact = reflected + (1.0 - reflected) * fiber.color_tt;
       EXPECT_LT((bcsdf_albedo(fiber, theta) - exact).abs().maxCoeff(), 1e-11)
           << named.name << " at " << theta_deg;
@@ -49,9 +52,9 @@ TEST(FiberBcsdfLaw, EnergyOfTheEvaluatedFunction) {
     for (const double theta_deg : {0.0, -50.0, 88.0}) {
       const double theta = radians(theta_deg);
       const Vec3d wi = vector_from({theta, 0.7});
-      const Rgbd value = integrate_sphere(named.scattering, -theta, 0.7 + kPi, [&](const Vec3d& wo) {
-        return evaluate_bcsdf(named.scattering, wi, wo);
-      });
+      const Rgbd value = integrate_sphere(
+          named.scattering, -theta, 0.7 + kPi,
+          [&](const Vec3d& wo) { return evaluate_bcsdf(named.scattering, wi, wo); });
       EXPECT_LT((value - bcsdf_albedo(named.scattering, theta)).abs().maxCoeff(), 1e-6)
           << named.name << " at " << theta_deg;
     }
@@ -117,7 +120,8 @@ TEST(FiberBcsdfAgreement, HarmonicsAgainstBruteForce) {
       const std::vector<Rgbd> row = bcsdf_sh(named.scattering, theta_o, kOrder);
       ASSERT_EQ(row.size(), static_cast<std::size_t>(kCount));
       for (int j = 0; j < kCount; ++j) {
-        EXPECT_LT((row[static_cast<std::size_t>(j)] - exact.row(j).transpose()).abs().maxCoeff(), 2e-6)
+        EXPECT_LT((row[static_cast<std::size_t>(j)] - exact.row(j).transpose()).abs().maxCoeff(),
+                  2e-6)
             << named.name << " at " << theta_deg << ", j " << j;
       }
     }
@@ -164,7 +168,8 @@ TEST(FiberBcsdfStability, FiniteAndNotNegativeEverywhere) {
       }
     }
     // Exactly along the tangent there is no azimuth.
-    EXPECT_TRUE(evaluate_bcsdf(named.scattering, Vec3d::UnitX(), -Vec3d::UnitX()).allFinite()) << named.name;
+    EXPECT_TRUE(evaluate_bcsdf(named.scattering, Vec3d::UnitX(), -Vec3d::UnitX()).allFinite())
+        << named.name;
   }
 }
 

@@ -1,7 +1,7 @@
 #ifndef HEDDLE_TESTS_FIBERS_SCATTERING_FIBERS_FOR_TESTS_H_
 #define HEDDLE_TESTS_FIBERS_SCATTERING_FIBERS_FOR_TESTS_H_
-// Fibers that the scattering tests loop over: measured ones (parameters as published for fabrics) and the
-// ends of the ranges.
+// Fibers that the scattering tests loop over: measured ones (parameters as published for fabrics)
+// and the ends of the ranges.
 
 #include <string>
 #include <vector>

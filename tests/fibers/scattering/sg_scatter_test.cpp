@@ -46,10 +46,12 @@ TEST(SgScatterAgreement, QuadratureAgainstBruteForce) {
   for (const NamedFiber& named : fibers_for_tests()) {
     const FiberScattering& fiber = named.scattering;
     for (const double sharpness : {0.5, 30.0, 2000.0}) {
-      const Vec3d wo = vector_from({2.6 * (random.uniform_double() - 0.5), 6.0 * random.uniform_double()});
+      const Vec3d wo =
+          vector_from({2.6 * (random.uniform_double() - 0.5), 6.0 * random.uniform_double()});
       const double theta_o = fiber_direction(wo).theta;
       const double phi_o = fiber_direction(wo).phi;
-      const FiberDirection axis{std::clamp(-theta_o + 0.1, -1.5, 1.5), phi_o + 2.0 + random.uniform_double()};
+      const FiberDirection axis{std::clamp(-theta_o + 0.1, -1.5, 1.5),
+                                phi_o + 2.0 + random.uniform_double()};
       std::vector<double> theta_breaks;
       std::vector<double> phi_breaks;
       append_geometric_breaks(-theta_o, std::min(fiber.beta_r, fiber.beta_tt), kPi, theta_breaks);
@@ -58,14 +60,16 @@ TEST(SgScatterAgreement, QuadratureAgainstBruteForce) {
       for (const double opposite : {phi_o - kPi, phi_o + kPi}) {
         append_geometric_breaks(opposite, std::min(1.0, fiber.gamma_tt), kPi, phi_breaks);
       }
-      const QuadratureRule phi_rule = gauss_legendre_panels(8, axis.phi - kPi, axis.phi + kPi, phi_breaks);
+      const QuadratureRule phi_rule =
+          gauss_legendre_panels(8, axis.phi - kPi, axis.phi + kPi, phi_breaks);
       const SphericalGaussian light{vector_from(axis), sharpness};
-      const Rgbd exact =
-          integrate(gauss_legendre_panels(10, -0.5 * kPi, 0.5 * kPi, theta_breaks), [&](double theta) {
+      const Rgbd exact = integrate(
+          gauss_legendre_panels(10, -0.5 * kPi, 0.5 * kPi, theta_breaks), [&](double theta) {
             const Rgbd ring = integrate(phi_rule, [&](double phi) {
               const Vec3d wi = vector_from({theta, phi});
               const double strength = sg_value(light, wi);
-              return strength > 1e-30 ? Rgbd(strength * evaluate_bcsdf(fiber, wi, wo)) : Rgbd(Rgbd::Zero());
+              return strength > 1e-30 ? Rgbd(strength * evaluate_bcsdf(fiber, wi, wo))
+                                      : Rgbd(Rgbd::Zero());
             });
             return Rgbd(ring * (std::cos(theta) * std::cos(theta)));
           });
@@ -85,15 +89,17 @@ TEST(SgScatterAgreement, WhiteIsotropicFiber) {
     std::vector<double> phi_breaks;
     append_geometric_breaks(0.4, 0.5 / std::sqrt(1.0 + sharpness), kPi, phi_breaks);
     const QuadratureRule phi_rule = gauss_legendre_panels(12, 0.4 - kPi, 0.4 + kPi, phi_breaks);
-    const double exact =
-        integrate(gauss_legendre_panels(12, -0.5 * kPi, 0.5 * kPi, theta_breaks), [&](double theta) {
+    const double exact = integrate(
+        gauss_legendre_panels(12, -0.5 * kPi, 0.5 * kPi, theta_breaks), [&](double theta) {
           const double cosine = std::cos(theta);
           return cosine * cosine / (kPi * kPi) * integrate(phi_rule, [&](double phi) {
                    return sg_value(light, vector_from({theta, phi}));
                  });
         });
-    EXPECT_NEAR(sg_scatter(white_isotropic_fiber(), light, wo, SgMethod::kQuadrature)[0] / exact, 1.0, 1e-10);
-    EXPECT_NEAR(sg_scatter(white_isotropic_fiber(), light, wo, SgMethod::kDefault)[0] / exact, 1.0, 2e-3);
+    EXPECT_NEAR(sg_scatter(white_isotropic_fiber(), light, wo, SgMethod::kQuadrature)[0] / exact,
+                1.0, 1e-10);
+    EXPECT_NEAR(sg_scatter(white_isotropic_fiber(), light, wo, SgMethod::kDefault)[0] / exact, 1.0,
+                2e-3);
   }
 }
 
@@ -105,7 +111,8 @@ struct ErrorRow {
 // Mean |error| / mean value over random lights near the specular cone, at sharpness 25, 100, 400.
 ErrorRow error_row(bool is_tt, double beta_deg, double gamma_deg, double low_deg, double high_deg) {
   const double sharpnesses[] = {25.0, 100.0, 400.0};
-  const FiberScattering fiber = fiber_in_degrees({.3, .3, .3}, {.7, .7, .7}, beta_deg, beta_deg, gamma_deg);
+  const FiberScattering fiber =
+      fiber_in_degrees({.3, .3, .3}, {.7, .7, .7}, beta_deg, beta_deg, gamma_deg);
   const Lobe lobe = is_tt ? Lobe::kTt : Lobe::kR;
   ErrorRow row{};
   for (int s = 0; s < 3; ++s) {
@@ -129,15 +136,17 @@ ErrorRow error_row(bool is_tt, double beta_deg, double gamma_deg, double low_deg
     row.three[s] *= 100.0 / total;
   }
   std::printf(
-      "  %s beta %4.1f deg, theta_o %2.0f to %2.0f deg: printed %6.2f %6.2f %6.2f %%, default %6.3f %6.3f "
+      "  %s beta %4.1f deg, theta_o %2.0f to %2.0f deg: printed %6.2f %6.2f %6.2f %%, default "
+      "%6.3f %6.3f "
       "%6.3f %%\n",
-      is_tt ? "TT" : "R ", beta_deg, low_deg, high_deg, row.printed[0], row.printed[1], row.printed[2],
-      row.three[0], row.three[1], row.three[2]);
+      is_tt ? "TT" : "R ", beta_deg, low_deg, high_deg, row.printed[0], row.printed[1],
+      row.printed[2], row.three[0], row.three[1], row.three[2]);
   return row;
 }
 
-// An independent prototype measured, with three plain Gauss-Hermite nodes, R at 75 to 85 degrees 3.9, 1.3,
-// 0.30 % at sharpness 25, 100, 400 and up to 60 degrees .34, .06, .01 %. The default must not be worse.
+// An independent prototype measured, with three plain Gauss-Hermite nodes, R at 75 to 85
+// degrees 3.9, 1.3, 0.30 % at sharpness 25, 100, 400 and up to 60 degrees .34, .06, .01 %. The
+// default must not be worse.
 TEST(SgScatterStability, ErrorsOfTheFastForms) {
   std::printf("  mean |error| at sharpness 25, 100, 400\n");
   for (const double beta : {5.0, 10.0}) {
@@ -145,7 +154,8 @@ TEST(SgScatterStability, ErrorsOfTheFastForms) {
     EXPECT_LT(grazing.three[0], 3.9);
     EXPECT_LT(grazing.three[1], 1.3);
     EXPECT_LT(grazing.three[2], 0.30);
-    // The printed form is known to fail here; that it does shows that the test measures what it claims.
+    // The printed form is known to fail here; that it does shows that the test measures what it
+    // claims.
     EXPECT_GT(grazing.printed[1], 4.0);
     const ErrorRow moderate = error_row(false, beta, 12.0, 0.0, 60.0);
     EXPECT_LT(moderate.three[0], 0.34);
@@ -171,8 +181,8 @@ TEST(SgScatterStability, FiniteAndNotNegativeEverywhere) {
             for (const SgMethod method : {SgMethod::kPrinted, SgMethod::kDefault}) {
               const Rgbd value = sg_scatter(named.scattering, light, wo, method);
               ASSERT_TRUE(value.allFinite() && value.minCoeff() >= 0.0)
-                  << named.name << ", sharpness " << sharpness << ", theta_o " << theta_deg << ", light "
-                  << light_deg;
+                  << named.name << ", sharpness " << sharpness << ", theta_o " << theta_deg
+                  << ", light " << light_deg;
             }
           }
           const SphericalGaussian light{vector_from({radians(light_deg), 3.0}), sharpness};

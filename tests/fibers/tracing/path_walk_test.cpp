@@ -40,7 +40,8 @@ FiberScattering dyed_fiber() {
   return fiber;
 }
 
-// Furnace: light 1 from everywhere, a white fiber: a path that follows the BCSDF carries exactly 1, wherever it leaves.
+// Furnace: light 1 from everywhere, a white fiber: a path that follows the BCSDF carries exactly 1,
+// wherever it leaves.
 TEST(PathWalkLaw, FurnaceByScatteringIsExactlyOne) {
   const TileScene scene(synthesize(test::small_fabric("twill 2/2")));
   const TileTrace trace(scene);
@@ -51,8 +52,8 @@ TEST(PathWalkLaw, FurnaceByScatteringIsExactlyOne) {
     const Vec3 direction = sample_hemisphere(Vec3(0, 0, -1), random);
     const auto first = trace.first(Vec3(random.uniform(), random.uniform(), 1), direction);
     if (!first) continue;
-    const auto escape = walk_path(trace, materials, *first, -direction, Rgb::Ones(), random, WalkLimits{},
-                                  [](auto&&...) { return true; });
+    const auto escape = walk_path(trace, materials, *first, -direction, Rgb::Ones(), random,
+                                  WalkLimits{}, [](auto&&...) { return true; });
     ASSERT_TRUE(escape);
     EXPECT_NEAR(escape->throughput.maxCoeff(), 1, 1e-4);
     ++paths;
@@ -72,12 +73,14 @@ TEST(PathWalkStatistical, FurnaceByLightSamplingIsOne) {
     if (!first) return 1.0;  // the light behind
     double sum = 0;
     walk_path(trace, materials, *first, -down, Rgb::Ones(), random, WalkLimits{},
-              [&](const TileTrace::Vertex& vertex, const Mat3& frame, const Vec3& wo, const Rgb& throughput, int) {
+              [&](const TileTrace::Vertex& vertex, const Mat3& frame, const Vec3& wo,
+                  const Rgb& throughput, int) {
                 const Vec3 wi = sample_sphere(random);
                 if (trace.escapes(vertex, wi)) {
                   const Vec3 local = frame.transpose() * wi;
                   const Rgb f = materials[0].evaluate(local, frame.transpose() * wo);
-                  sum += static_cast<double>((throughput * f)[0]) * std::sqrt(1 - local.x() * local.x()) * 4 * kPi;
+                  sum += static_cast<double>((throughput * f)[0]) *
+                         std::sqrt(1 - local.x() * local.x()) * 4 * kPi;
                 }
                 return true;
               });
@@ -89,8 +92,9 @@ TEST(PathWalkStatistical, FurnaceByLightSamplingIsOne) {
   EXPECT_NEAR(radiance.mean, 1, 4 * radiance.standard_error);
 }
 
-// Single scattering on a fiber beside parallel ones, under light 1 from everywhere, against quadrature: parallel fiber B
-// hides the azimuths within asin(r / distance) of the direction to its axis, whatever the inclination.
+// Single scattering on a fiber beside parallel ones, under light 1 from everywhere, against
+// quadrature: parallel fiber B hides the azimuths within asin(r / distance) of the direction to its
+// axis, whatever the inclination.
 TEST(PathWalkStatistical, ParallelFibersAgreeWithQuadrature) {
   const float r = 0.05F;
   const float height = 4;
@@ -101,7 +105,8 @@ TEST(PathWalkStatistical, ParallelFibersAgreeWithQuadrature) {
     if (two) places.emplace_back(2.15F, 0.04F);
     const TileScene scene(test::straight_fibers(1, height, places, r, 4, fiber));
     const TileTrace trace(scene);
-    // A view that meets fiber 0 from above and aside; the hit point is where both eye ray and cylinder say.
+    // A view that meets fiber 0 from above and aside; the hit point is where both eye ray and
+    // cylinder say.
     const Vec3 direction = Vec3(0.35F, -0.3F, -1).normalized();
     const Vec3 target(0.4F, 2.01F, 0);
     const auto first = trace.first(target - 2 * direction, direction);
@@ -119,7 +124,8 @@ TEST(PathWalkStatistical, ParallelFibersAgreeWithQuadrature) {
         hidden.emplace_back(centre - half, centre + half);
       }
     }
-    // Integral over azimuth (fine midpoint rule, steps at the edges) and inclination (Gauss-Legendre).
+    // Integral over azimuth (fine midpoint rule, steps at the edges) and inclination
+    // (Gauss-Legendre).
     const QuadratureRule theta = gauss_legendre(128, -kPi / 2, kPi / 2);
     Rgbd expected = Rgbd::Zero();
     const int azimuths = 4000;
@@ -127,13 +133,15 @@ TEST(PathWalkStatistical, ParallelFibersAgreeWithQuadrature) {
       const double phi = -kPi + 2 * kPi * (k + 0.5) / azimuths;
       bool open = true;
       for (const auto& [low, high] : hidden) {
-        for (double turn : {-2 * kPi, 0.0, 2 * kPi}) open = open && !(phi + turn > low && phi + turn < high);
+        for (double turn : {-2 * kPi, 0.0, 2 * kPi})
+          open = open && !(phi + turn > low && phi + turn < high);
       }
       if (!open) continue;
       for (std::size_t n = 0; n < theta.nodes.size(); ++n) {
         const double t = theta.nodes[n];
         const Vec3d wi(std::sin(t), std::cos(t) * std::cos(phi), std::cos(t) * std::sin(phi));
-        expected += evaluate_bcsdf(fiber, wi, wo) * (std::cos(t) * std::cos(t) * theta.weights[n] * 2 * kPi / azimuths);
+        expected += evaluate_bcsdf(fiber, wi, wo) *
+                    (std::cos(t) * std::cos(t) * theta.weights[n] * 2 * kPi / azimuths);
       }
     }
     for (int channel = 0; channel < 3; ++channel) {
@@ -141,13 +149,16 @@ TEST(PathWalkStatistical, ParallelFibersAgreeWithQuadrature) {
         RandomStream random(1, RandomStage::kTest, 12, static_cast<std::uint64_t>(i));
         const Mat3 frame = frame_about(first->tangent);
         const auto sample = materials[0].sample(frame.transpose() * -direction, random);
-        return trace.escapes(*first, frame * sample.wi) ? static_cast<double>(sample.weight[channel]) : 0.0;
+        return trace.escapes(*first, frame * sample.wi)
+                   ? static_cast<double>(sample.weight[channel])
+                   : 0.0;
       });
       std::printf("%s, channel %d: %.5f against quadrature %.5f, %.2f standard errors\n",
                   two ? "parallel fibers" : "one fiber", channel, radiance.mean, expected[channel],
                   (radiance.mean - expected[channel]) / radiance.standard_error);
       // 2e-3: the azimuth rule's steps at the edges of the hidden intervals.
-      EXPECT_NEAR(radiance.mean, expected[channel], 4 * radiance.standard_error + 2e-3 * expected[channel]);
+      EXPECT_NEAR(radiance.mean, expected[channel],
+                  4 * radiance.standard_error + 2e-3 * expected[channel]);
     }
   }
 }
@@ -159,10 +170,11 @@ TEST(PathWalk, EndsWhereTheVisitorSaysSo) {
   RandomStream random(1, RandomStage::kTest, 13, 0);
   const TileTrace::Vertex start = trace.at(scene.exemplar().segment_midpoint(5), 5);
   int visits = 0;
-  EXPECT_FALSE(walk_path(trace, materials, start, Vec3(0, 0, 1), Rgb::Ones(), random, WalkLimits{}, [&](auto&&...) {
-    ++visits;
-    return false;
-  }));
+  EXPECT_FALSE(walk_path(trace, materials, start, Vec3(0, 0, 1), Rgb::Ones(), random, WalkLimits{},
+                         [&](auto&&...) {
+                           ++visits;
+                           return false;
+                         }));
   EXPECT_EQ(visits, 1);
 }
 

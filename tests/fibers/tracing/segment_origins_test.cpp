@@ -43,7 +43,9 @@ TEST(SegmentOriginsLaw, PrintedChoiceIsTheMidpoint) {
     EXPECT_EQ(printed.position[s], scene.exemplar().segment_midpoint(s));
     const float distance = (exposed.position[s] - printed.position[s]).norm();
     if (distance > 0) {
-      EXPECT_NEAR(distance, kExposedDepth * scene.exemplar().radius_mm[scene.exemplar().segment_fiber[s]], 1e-5F);
+      EXPECT_NEAR(distance,
+                  kExposedDepth * scene.exemplar().radius_mm[scene.exemplar().segment_fiber[s]],
+                  1e-5F);
       ++moved;
     } else {
       EXPECT_EQ(exposed.openness[s], 0);  // nothing to choose by

@@ -12,7 +12,8 @@
 namespace heddle {
 namespace {
 
-// First hit with the capsule of a segment (both ends rounded), t of the ray; negative where there is none.
+// First hit with the capsule of a segment (both ends rounded), t of the ray; negative where there
+// is none.
 double intersect_capsule(const Vec3d& o, const Vec3d& d, const Vec3d& a, const Vec3d& b, double r) {
   const Vec3d axis = (b - a).normalized();
   const double length = (b - a).norm();
@@ -43,7 +44,8 @@ double first_hit_by_hand(const Exemplar& e, const Ray& ray, std::uint32_t own_fi
     if (e.segment_fiber[s] == own_fiber) continue;
     for (int j = -copies; j <= copies; ++j) {
       for (int i = -copies; i <= copies; ++i) {
-        const Vec3d shift(i * static_cast<double>(e.width_mm), j * static_cast<double>(e.height_mm), 0);
+        const Vec3d shift(i * static_cast<double>(e.width_mm), j * static_cast<double>(e.height_mm),
+                          0);
         const double t = intersect_capsule(ray.origin.cast<double>(), ray.direction.cast<double>(),
                                            e.points[e.segment_point[s]].cast<double>() + shift,
                                            e.points[e.segment_point[s] + 1].cast<double>() + shift,
@@ -63,7 +65,8 @@ TEST(TileSceneAgreement, EyeRaysAgreeWithBruteForceOverCopies) {
     RandomStream random(1, RandomStage::kTest, 1, static_cast<std::uint64_t>(i));
     const Vec3 origin(3 * random.uniform() - 1, 3 * random.uniform() - 1, 0.5F);
     const Vec3 direction = sample_hemisphere(Vec3(0, 0, -1), random);
-    if (direction.z() > -0.3F) continue;  // at most 1.9 mm aside: within the copies of the brute force
+    // at most 1.9 mm aside: within the copies of the brute force
+    if (direction.z() > -0.3F) continue;
     const Ray ray{origin, 2.5F * direction};
     const double expected = first_hit_by_hand(e, ray, kNoFiber, 7);
     const auto hit = scene.intersect(ray, kNoFiber);
@@ -85,16 +88,21 @@ TEST(TileSceneLaw, AWholePeriodChangesNothing) {
     const Vec3 origin(random.uniform() * e.width_mm, random.uniform() * e.height_mm, 0.3F);
     const Vec3 direction = sample_hemisphere(Vec3(0, 0, -1), random);
     const auto a = scene.intersect({origin, direction}, kNoFiber);
-    const auto b = scene.intersect({origin + Vec3(-3 * e.width_mm, 2 * e.height_mm, 0), direction}, kNoFiber);
-    // Rounding of the shifted origin may move a ray that grazes a silhouette to the other side of it.
-    if (a.has_value() != b.has_value() || (a && (a->segment != b->segment || std::abs(a->t - b->t) > 1e-4F))) ++differing;
+    const auto b =
+        scene.intersect({origin + Vec3(-3 * e.width_mm, 2 * e.height_mm, 0), direction}, kNoFiber);
+    // Rounding of the shifted origin may move a ray that grazes a silhouette to the other side of
+    // it.
+    if (a.has_value() != b.has_value() ||
+        (a && (a->segment != b->segment || std::abs(a->t - b->t) > 1e-4F)))
+      ++differing;
   }
   EXPECT_LE(differing, 4);
 }
 
 TEST(TileSceneLaw, OwnFiberIsIgnoredInEveryCopy) {
   // One fiber, endless rows of its copies: with itself excluded, nothing is left to hit.
-  const TileScene scene(test::straight_fibers(1, 0.5F, {{0.25F, 0}}, 0.05F, 5, test::white_fiber()));
+  const TileScene scene(
+      test::straight_fibers(1, 0.5F, {{0.25F, 0}}, 0.05F, 5, test::white_fiber()));
   const Vec3 inside(0.5F, 0.25F, 0);
   EXPECT_TRUE(scene.occluded({inside, Vec3(0, 1, 0)}, kNoFiber));
   EXPECT_FALSE(scene.occluded({inside, Vec3(0, 1, 0)}, 0));
@@ -120,7 +128,8 @@ TEST(TileSceneLaw, RangeLimitsHold) {
 TEST(TileSceneLaw, ARowOfFibersClosesAtTheKnownAngle) {
   const float r = 0.1F;
   const TileScene scene(test::straight_fibers(1, 0.5F, {{0.25F, 0}}, r, 4, test::white_fiber()));
-  // Seen from height 0 in the gap's middle, the neighbour at distance 0.25 subtends asin(r / 0.25) about the horizon.
+  // Seen from height 0 in the gap's middle, the neighbour at distance 0.25 subtends asin(r / 0.25)
+  // about the horizon.
   const float edge = std::asin(r / 0.25F);
   const Vec3 middle(0.31F, 0.5F, 0);
   for (float off : {-0.01F, 0.01F}) {
@@ -129,7 +138,8 @@ TEST(TileSceneLaw, ARowOfFibersClosesAtTheKnownAngle) {
   }
 }
 
-// Sparse parallel fibers, n per area, attenuate like exp(-2 r n sin(angle to the fibers) t) within their slab.
+// Sparse parallel fibers, n per area, attenuate like exp(-2 r n sin(angle to the fibers) t) within
+// their slab.
 TEST(TileSceneStatistical, MeanFreePathOfASparseBundle) {
   constexpr int kFibers = 600;
   constexpr float kHalfSlab = 10;
@@ -154,7 +164,8 @@ TEST(TileSceneStatistical, MeanFreePathOfASparseBundle) {
     distance += (1 - (1 + depth) * std::exp(-depth)) / extinction;
   }
   // The places are one random draw: their local density varies by about 1 / sqrt(600).
-  EXPECT_NEAR(scene.mean_free_path(1, 40000), distance / hits, 2.5 * distance / hits / std::sqrt(kFibers));
+  EXPECT_NEAR(scene.mean_free_path(1, 40000), distance / hits,
+              2.5 * distance / hits / std::sqrt(kFibers));
 }
 
 }  // namespace

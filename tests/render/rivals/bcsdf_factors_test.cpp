@@ -39,9 +39,11 @@ TEST(BcsdfFactorsAgreement, AllTermsAreTheBcsdfOnTheLattice) {
     for (int k = 0; k < 200; ++k) {
       const int i = static_cast<int>(random.index(static_cast<std::uint64_t>(factors.thetas())));
       const double theta_i = lattice_theta(factors, i);
-      const double theta_o = lattice_theta(factors, factors.thetas() - 1 - i);  // on the specular cone
+      // on the specular cone
+      const double theta_o = lattice_theta(factors, factors.thetas() - 1 - i);
       const double phi = 2 * kPi * random.uniform_double();
-      const Rgbd exact = std::cos(theta_i) * evaluate_bcsdf(fiber, vector_from({theta_i, 0.3}), vector_from({theta_o, phi}));
+      const Rgbd exact = std::cos(theta_i) * evaluate_bcsdf(fiber, vector_from({theta_i, 0.3}),
+                                                            vector_from({theta_o, phi}));
       const Rgb value = factors.value(direction(theta_i, 0.3), direction(theta_o, phi));
       // 1e-3: asin in float near the poles, where a step of the lattice is a large part of a lobe.
       EXPECT_LT((value.cast<double>() - exact).abs().maxCoeff(), 2e-3 * exact.maxCoeff() + 1e-5)
@@ -73,7 +75,8 @@ TEST(BcsdfFactorsAgreement, ResponseToGaussiansIsGamma) {
 }
 
 TEST(BcsdfFactorsLaw, WhatIsCutOffIsWhatTheSingularValuesSay) {
-  // Eckart and Young: the squared weighted difference to the full matrix, over its squared norm, is 1 less the kept share.
+  // Eckart and Young: the squared weighted difference to the full matrix, over its squared norm, is
+  // 1 less the kept share.
   const FiberScattering cotton = test_cotton();
   const BcsdfFactors full(cotton, BcsdfFactors::kAllTerms);
   double last = 0;
@@ -110,20 +113,22 @@ TEST(BcsdfFactorsLaw, WhatIsCutOffIsWhatTheSingularValuesSay) {
 TEST(BcsdfFactors, IsotropicFiberHasOneTerm) {
   const BcsdfFactors factors(white_isotropic(), 1);
   EXPECT_NEAR(factors.energy()[0], 1, 1e-5);
-  EXPECT_NEAR(factors.value(direction(0.3, 1), direction(-0.8, 2)).x(), std::cos(0.3) / (kPi * kPi), 1e-4);
+  EXPECT_NEAR(factors.value(direction(0.3, 1), direction(-0.8, 2)).x(), std::cos(0.3) / (kPi * kPi),
+              1e-4);
 }
 
 TEST(BcsdfFactorsStability, SixteenTermsOfASpecularFiber) {
-  // The R lobe of 1 degree needs hundreds of terms. By solid angles, sixteen keep a blurred picture of it, a small part of its
-  // height; of the plain matrix they keep grazing directions and nothing else.
+  // The R lobe of 1 degree needs hundreds of terms. By solid angles, sixteen keep a blurred picture
+  // of it, a small part of its height; of the plain matrix they keep grazing directions and nothing
+  // else.
   const BcsdfFactors full(silk(), BcsdfFactors::kAllTerms);
   const BcsdfFactors weighted(silk(), 16);
   const BcsdfFactors plain(silk(), 16, BcsdfFactors::Matrix::kPlain);
   const Vec3 wi = direction(0.4, 0);
   const Vec3 wo = direction(-0.4, 0.5);
   const float peak = full.value(wi, wo).x();
-  std::printf("  share of the squared norm in 16 terms: %.3f %.3f %.3f, plain matrix %.3f\n", weighted.energy()[0],
-              weighted.energy()[1], weighted.energy()[2], plain.energy()[0]);
+  std::printf("  share of the squared norm in 16 terms: %.3f %.3f %.3f, plain matrix %.3f\n",
+              weighted.energy()[0], weighted.energy()[1], weighted.energy()[2], plain.energy()[0]);
   EXPECT_LT(weighted.energy()[0], 0.4);
   EXPECT_LT(std::abs(weighted.value(wi, wo).x()), 0.3F * peak);
   EXPECT_LT(std::abs(plain.value(wi, wo).x()), 1e-3F * peak);

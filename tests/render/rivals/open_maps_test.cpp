@@ -14,7 +14,8 @@ TEST(OpenMapsLaw, CellsCoverTheSphereOrItsUpperHalf) {
   for (const bool both_sides : {false, true}) {
     const OpenMaps maps(ssdf, both_sides);
     const auto& areas = maps.solid_angles();
-    EXPECT_NEAR(std::accumulate(areas.begin(), areas.end(), 0.0), both_sides ? 4 * kPi : 2 * kPi, 1e-9);
+    EXPECT_NEAR(std::accumulate(areas.begin(), areas.end(), 0.0), both_sides ? 4 * kPi : 2 * kPi,
+                1e-9);
     for (const Vec3d& w : maps.directions()) EXPECT_NEAR(w.norm(), 1, 1e-12);
   }
 }

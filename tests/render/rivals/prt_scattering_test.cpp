@@ -27,15 +27,17 @@ TEST(PrtScatteringLaw, OpenSkyHandsEveryHarmonicOn) {
   const PrtScattering prt(ssdf, true, materials);
   for (int j = 0; j < kCount; ++j) {
     // 1e-3: V = 1 projected by the midpoints of the map's cells.
-    EXPECT_LT((prt.transferred(0, Eigen::VectorXf::Unit(kCount, j)) - Eigen::VectorXf::Unit(kCount, j))
-                  .cwiseAbs()
-                  .maxCoeff(),
-              1e-3);
+    EXPECT_LT(
+        (prt.transferred(0, Eigen::VectorXf::Unit(kCount, j)) - Eigen::VectorXf::Unit(kCount, j))
+            .cwiseAbs()
+            .maxCoeff(),
+        1e-3);
   }
 }
 
 TEST(PrtScattering, HalfOfTheSkyHasTheKnownMatrix) {
-  // Over z > 0: Y_00 Y_00 gives 1/2, Y_00 Y_10 gives sqrt(3) / 4, Y_10 Y_10 gives 1/2; what is odd in x or y nothing.
+  // Over z > 0: Y_00 Y_00 gives 1/2, Y_00 Y_10 gives sqrt(3) / 4, Y_10 Y_10 gives 1/2; what is odd
+  // in x or y nothing.
   const SsdfVisibility ssdf = uniform_visibility({upper_half_space});
   const std::vector<BcsdfTable> materials = {BcsdfTable(test_cotton())};
   const PrtScattering prt(ssdf, false, materials);
@@ -60,15 +62,17 @@ TEST(PrtScatteringAgreement, ConstantLightUnderOpenSkyIsExact) {
     const Vec3 tangent = sample_sphere(random);
     const Vec3 wo = sample_sphere(random);
     const Vec3d local = (frame_about(tangent).transpose() * wo).cast<double>();
-    const Rgbd exact = sg_scatter(cotton, {Vec3d(0, 0, 1), 0}, local, SgMethod::kQuadrature) / sg_mass(0.0);
+    const Rgbd exact =
+        sg_scatter(cotton, {Vec3d(0, 0, 1), 0}, local, SgMethod::kQuadrature) / sg_mass(0.0);
     const Rgb value = prt.spherical_gaussian(point_with(tangent, wo), {{0, 0, 1}, {0, 0, 1}}, 0);
     EXPECT_LT((value.cast<double>() - exact).abs().maxCoeff(), 3e-3 * exact.maxCoeff());
   }
 }
 
 TEST(PrtScatteringStability, LosesHighlightsAndRings) {
-  // A silk fiber along x in open sky, light at 30 degrees from the normal plane. Order 5 turns the highlight of 1 degree
-  // into a bump of about 30 degrees: less than a tenth of its height is left, and there is light of the wrong sign.
+  // A silk fiber along x in open sky, light at 30 degrees from the normal plane. Order 5 turns the
+  // highlight of 1 degree into a bump of about 30 degrees: less than a tenth of its height is left,
+  // and there is light of the wrong sign.
   FiberScattering silk;
   silk.color_r = Rgbd(0.745, 0.008, 0.070);
   silk.color_tt = Rgbd(0.620, 0.553, 0.562);

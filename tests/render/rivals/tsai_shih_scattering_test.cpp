@@ -23,8 +23,9 @@ TEST(TsaiShihScattering, VisibilityIsTheMapSeenThroughGaussians) {
   RunningMean ripple;  // squared
   for (int k = 0; k < 2000; ++k) {
     const Vec3 w = sample_sphere(random);
-    // Fourteen degrees are four deviations and half a cell from the edge. What is left are ripples of the axes' lattice, and
-    // cells of the map that count for one axis as a whole: 15 % at most (measured: 14), 5 % in the mean square (4).
+    // Fourteen degrees are four deviations and half a cell from the edge. What is left are ripples
+    // of the axes' lattice, and cells of the map that count for one axis as a whole: 15 % at most
+    // (measured: 14), 5 % in the mean square (4).
     if (w.z() > std::sin(0.25F)) {
       EXPECT_NEAR(scattering.visibility(0, w), 1, 0.15);
       ripple.add(std::pow(scattering.visibility(0, w) - 1, 2));
@@ -50,7 +51,8 @@ TEST(TsaiShihScatteringLaw, WhiteFurnaceUnderOpenSky) {
 }
 
 TEST(TsaiShihScatteringStatistical, AllTermsUnderHalfASkyAgreeWithSampling) {
-  // Against the integral of L V S cos over directions drawn from the light: the truth that Khungurn 2017 compares with.
+  // Against the integral of L V S cos over directions drawn from the light: the truth that Khungurn
+  // 2017 compares with.
   const FiberScattering cotton = test_cotton();
   const SsdfVisibility ssdf = uniform_visibility({upper_half_space});
   const std::vector<BcsdfTable> materials = {BcsdfTable(cotton)};
@@ -72,12 +74,13 @@ TEST(TsaiShihScatteringStatistical, AllTermsUnderHalfASkyAgreeWithSampling) {
       truth.add(w.z() > 0 ? cosine * materials[0].evaluate(wi, to_fiber * wo).x() : 0);
     }
     const ShadingPoint point = {0, 0, 0, {tangent, tangent}, {wo, wo}};
-    difference += std::abs(scattering.spherical_gaussian(point, {axis, axis}, 50).x() - truth.mean());
+    difference +=
+        std::abs(scattering.spherical_gaussian(point, {axis, axis}, 50).x() - truth.mean());
     total += truth.mean();
     noise += truth.standard_error();
   }
-  std::printf("  mean |difference| %.2f %% of the mean, of which noise %.2f %%\n", 100 * difference / total,
-              100 * noise / total);
+  std::printf("  mean |difference| %.2f %% of the mean, of which noise %.2f %%\n",
+              100 * difference / total, 100 * noise / total);
   // 3 %: the edge of visibility blurred by 3.2 degrees under a light of 8.
   EXPECT_LT(difference, 0.03 * total + noise);
 }

@@ -10,7 +10,8 @@
 
 namespace heddle {
 
-inline SsdfVisibility uniform_visibility(const std::vector<std::function<double(const Vec3d&)>>& distances) {
+inline SsdfVisibility uniform_visibility(
+    const std::vector<std::function<double(const Vec3d&)>>& distances) {
   SsdfVisibility ssdf;
   const int n = ssdf.resolution;
   ssdf.components = static_cast<int>(distances.size());
@@ -18,13 +19,15 @@ inline SsdfVisibility uniform_visibility(const std::vector<std::function<double(
     for (int column = 0; column < n; ++column) {
       const double polar = kPi * (row + 0.5) / n;
       const double azimuth = 2 * kPi * (column + 0.5) / n;
-      const Vec3d w(std::sin(polar) * std::cos(azimuth), std::sin(polar) * std::sin(azimuth), std::cos(polar));
+      const Vec3d w(std::sin(polar) * std::cos(azimuth), std::sin(polar) * std::sin(azimuth),
+                    std::cos(polar));
       ssdf.mean.push_back(0);
       for (const auto& distance : distances) ssdf.basis.push_back(static_cast<float>(distance(w)));
     }
   }
   for (std::size_t s = 0; s < distances.size(); ++s) {
-    for (std::size_t k = 0; k < distances.size(); ++k) ssdf.coefficients.push_back(half_from_float(s == k ? 1.0F : 0.0F));
+    for (std::size_t k = 0; k < distances.size(); ++k)
+      ssdf.coefficients.push_back(half_from_float(s == k ? 1.0F : 0.0F));
   }
   ssdf.sees_nothing.assign(distances.size(), 0);
   return ssdf;

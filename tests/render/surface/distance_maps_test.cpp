@@ -26,15 +26,18 @@ DistanceMaps wall_map(const Vec3& m, const Mat3& frame, int resolution = 64) {
 }
 
 TEST(DistanceMaps, HorizonOfAnOpenSurface) {
-  const DistanceMaps maps = wall_map(Vec3(0, 0, -1), Mat3::Identity());  // nothing above the horizon is hidden
+  // nothing above the horizon is hidden
+  const DistanceMaps maps = wall_map(Vec3(0, 0, -1), Mat3::Identity());
   RandomStream random(1, RandomStage::kTest, 0, 0);
   for (int k = 0; k < 500; ++k) {
     const Vec3d w = upper_direction(random);
     const SignedDistance at = maps.evaluate(maps.coefficients(0), w);
     const double elevation = std::asin(w.z());
-    // The map's horizon is a line between cells here, so the distances are exact but for interpolation.
+    // The map's horizon is a line between cells here, so the distances are exact but for
+    // interpolation.
     EXPECT_NEAR(at.distance, elevation, radians(2));
-    if (elevation > radians(80) || std::abs(w.x()) > 0.95) continue;  // the ridge above, the poles of the map
+    // the ridge above, the poles of the map
+    if (elevation > radians(80) || std::abs(w.x()) > 0.95) continue;
     const Vec3d up = (Vec3d(0, 0, 1) - w.z() * w).normalized();
     EXPECT_GT(at.gradient.dot(up), std::cos(radians(12))) << w.transpose();
     EXPECT_NEAR(at.gradient.norm(), 1, 1e-9);
@@ -51,8 +54,8 @@ TEST(DistanceMapsLaw, DistanceToAWallIsGeodesic) {
     const double to_wall = std::asin(-w.dot(m.cast<double>()));
     const double to_horizon = std::asin(w.z());
     if (std::abs(w.x()) > 0.95) continue;
-    // The visible part is a lune: away from its corners the nearest of its two sides is the nearest border. Half a cell's
-    // diagonal is 2 degrees.
+    // The visible part is a lune: away from its corners the nearest of its two sides is the nearest
+    // border. Half a cell's diagonal is 2 degrees.
     const SignedDistance at = maps.evaluate(maps.coefficients(0), w);
     if (to_wall > 0) {
       EXPECT_NEAR(at.distance, std::min(to_wall, to_horizon), radians(2.5)) << w.transpose();
@@ -100,10 +103,10 @@ TEST(DistanceMaps, ComponentsCompress) {
       middle[k] = 0.5F * (maps.coefficients(3)[k] + maps.coefficients(4)[k]);
     }
     const Vec3d w = Vec3d(0.1, 0.4, 0.9).normalized();
-    EXPECT_NEAR(
-        maps.evaluate(middle, w).distance,
-        0.5 * (maps.evaluate(maps.coefficients(3), w).distance + maps.evaluate(maps.coefficients(4), w).distance),
-        1e-5);
+    EXPECT_NEAR(maps.evaluate(middle, w).distance,
+                0.5 * (maps.evaluate(maps.coefficients(3), w).distance +
+                       maps.evaluate(maps.coefficients(4), w).distance),
+                1e-5);
   }
   EXPECT_LT(before, 1e-4) << "as many components as vertices leave nothing";
 }
@@ -113,23 +116,27 @@ TEST(DistanceMapsLaw, LinesFollowTheBorder) {
   const Vec3d m = Vec3d(0.6, 0.3, -0.7).normalized();
   RandomStream random(4, RandomStage::kTest, 0, 0);
   for (int k = 0; k < 200; ++k) {
-    const Mat3d frame = frame_about(sample_sphere(random)).cast<double>();  // columns tangent, binormal, normal
+    // columns tangent, binormal, normal
+    const Mat3d frame = frame_about(sample_sphere(random)).cast<double>();
     const double theta = 1.2 * (2 * random.uniform_double() - 1);
     const double phi = 1.5 * (2 * random.uniform_double() - 1);
     const auto direction = [&](double t, double p) {
-      return Vec3d(frame * Vec3d(std::sin(t), std::cos(t) * std::sin(p), std::cos(t) * std::cos(p)));
+      return Vec3d(frame *
+                   Vec3d(std::sin(t), std::cos(t) * std::sin(p), std::cos(t) * std::cos(p)));
     };
     const Vec3d w = direction(theta, phi);
     const double distance = std::asin(-w.dot(m));
     if (std::abs(distance) > 0.05) continue;
     const SignedDistance at{distance, -(m - w * w.dot(m)).normalized()};
-    const VisibilityLine line = visibility_line(
-        at, std::cos(theta),
-        frame * Vec3d(std::cos(theta), -std::sin(theta) * std::sin(phi), -std::sin(theta) * std::cos(phi)),
-        frame * Vec3d(0, std::cos(phi), -std::sin(phi)));
+    const VisibilityLine line =
+        visibility_line(at, std::cos(theta),
+                        frame * Vec3d(std::cos(theta), -std::sin(theta) * std::sin(phi),
+                                      -std::sin(theta) * std::cos(phi)),
+                        frame * Vec3d(0, std::cos(phi), -std::sin(phi)));
     EXPECT_NEAR(std::hypot(line.theta_gradient, line.phi_gradient), 1, 1e-12);
     // The foot of the perpendicular in (theta, phi) is on the border, up to its curvature there.
-    const Vec3d foot = direction(theta - line.distance * line.theta_gradient, phi - line.distance * line.phi_gradient);
+    const Vec3d foot = direction(theta - line.distance * line.theta_gradient,
+                                 phi - line.distance * line.phi_gradient);
     EXPECT_NEAR(foot.dot(m), 0, 2 * line.distance * line.distance + 1e-9);
   }
   EXPECT_GT(visibility_line({1, Vec3d::Zero()}, 1, Vec3d(1, 0, 0), Vec3d(0, 1, 0)).distance, 10);
@@ -140,13 +147,15 @@ TEST(DistanceMapsAgreement, EightAtATime) {
   const Vec3 m = Vec3(0.6F, 0.3F, -0.4F).normalized();
   const DistanceMaps maps = wall_map(m, Mat3::Identity());
   const auto vector_of = [](const Vec8& v, int lane) {
-    return Vec3d(static_cast<double>(v.x[lane]), static_cast<double>(v.y[lane]), static_cast<double>(v.z[lane]));
+    return Vec3d(static_cast<double>(v.x[lane]), static_cast<double>(v.y[lane]),
+                 static_cast<double>(v.z[lane]));
   };
   RandomStream random(4, RandomStage::kTest, 0, 0);
   for (int k = 0; k < 500; ++k) {
     Vec8 directions;
     for (int lane = 0; lane < 8; ++lane) {
-      const Vec3 w = lane == k % 8 ? Vec3(Vec3::Unit(k % 3) * (k % 2 == 0 ? 1 : -1)) : sample_sphere(random);
+      const Vec3 w =
+          lane == k % 8 ? Vec3(Vec3::Unit(k % 3) * (k % 2 == 0 ? 1 : -1)) : sample_sphere(random);
       directions.x[lane] = w.x();
       directions.y[lane] = w.y();
       directions.z[lane] = w.z();
@@ -167,7 +176,8 @@ TEST(DistanceMapsAgreement, EightAtATime) {
       const VisibilityLine line = visibility_line(one, 0.5, a, b);
       if (std::hypot(one.gradient.dot(a), 0.5 * one.gradient.dot(b)) < 0.1) continue;
       EXPECT_NEAR(static_cast<double>(lines.theta_gradient[lane]), line.theta_gradient, 0.1);
-      EXPECT_NEAR(static_cast<double>(lines.distance[lane]), line.distance, 0.1 * std::abs(line.distance) + 1e-3);
+      EXPECT_NEAR(static_cast<double>(lines.distance[lane]), line.distance,
+                  0.1 * std::abs(line.distance) + 1e-3);
     }
   }
 }
@@ -180,13 +190,16 @@ TEST_F(DistanceMapsFormat, ReadsWhatItWrote) {
   EXPECT_EQ(TensorFile::read(folder_ / "maps.safetensors").metadata_value("key"), "abc");
   const DistanceMaps read = DistanceMaps::read(folder_ / "maps.safetensors", 1);
   EXPECT_EQ(read.vertex_count(), 1U);
-  EXPECT_NE(error_of([&] { DistanceMaps::read(folder_ / "maps.safetensors", 2); }).find("coefficients"), std::string::npos)
+  EXPECT_NE(
+      error_of([&] { DistanceMaps::read(folder_ / "maps.safetensors", 2); }).find("coefficients"),
+      std::string::npos)
       << "of another mesh";
   EXPECT_EQ(read.compression_error(), maps.compression_error());
   RandomStream random(9, RandomStage::kTest, 0, 0);
   for (int k = 0; k < 100; ++k) {
     const Vec3d w = upper_direction(random);
-    EXPECT_EQ(read.evaluate(read.coefficients(0), w).distance, maps.evaluate(maps.coefficients(0), w).distance);
+    EXPECT_EQ(read.evaluate(read.coefficients(0), w).distance,
+              maps.evaluate(maps.coefficients(0), w).distance);
   }
 }
 
@@ -201,8 +214,10 @@ TEST_F(DistanceMapsFormat, SizesThatDoNotFitAreNamed) {
     return error_of([&] { DistanceMaps::read(folder_ / "bad.safetensors", 2); });
   };
   EXPECT_EQ(message(4, 4, 8, 8), "no error");
-  for (const auto& [rows, columns, stride] : {std::array<std::uint64_t, 3>{4, 5, 8}, {3, 3, 8}, {4, 4, 9}, {4, 4, 0}}) {
-    EXPECT_NE(message(rows, columns, stride, stride).find("bad.safetensors: 'basis'"), std::string::npos);
+  for (const auto& [rows, columns, stride] :
+       {std::array<std::uint64_t, 3>{4, 5, 8}, {3, 3, 8}, {4, 4, 9}, {4, 4, 0}}) {
+    EXPECT_NE(message(rows, columns, stride, stride).find("bad.safetensors: 'basis'"),
+              std::string::npos);
   }
   EXPECT_NE(message(4, 4, 8, 16).find("coefficients"), std::string::npos);
 }

@@ -1,5 +1,5 @@
-// The energy-safe variants of the woven models: parameters with which the published forms return up to four times what
-// arrives, and what the variants make of them.
+// The energy-safe variants of the woven models: parameters with which the published forms return up
+// to four times what arrives, and what the variants make of them.
 
 #include "render/surface/energy_scale.h"
 
@@ -23,7 +23,8 @@ namespace {
 
 const SurfacePoint kFar = {Vec2(0.1F, 0.2F), 1000};
 
-std::unique_ptr<const SurfaceModel> cotton(const char* preset, bool energy_safe, double diffuse, double specular) {
+std::unique_ptr<const SurfaceModel> cotton(const char* preset, bool energy_safe, double diffuse,
+                                           double specular) {
   const TomlTable document = surface_preset(preset);
   document.string("model");
   WovenCottonParameters parameters = read_woven_cotton(document);
@@ -35,7 +36,8 @@ std::unique_ptr<const SurfaceModel> cotton(const char* preset, bool energy_safe,
   return std::make_unique<WovenCotton>(parameters);
 }
 
-std::unique_ptr<const SurfaceModel> yarns(const char* preset, bool energy_safe, double diffuse, double specular) {
+std::unique_ptr<const SurfaceModel> yarns(const char* preset, bool energy_safe, double diffuse,
+                                          double specular) {
   const TomlTable document = surface_preset(preset);
   document.string("model");
   WovenYarnsParameters parameters = read_woven_yarns(document);
@@ -54,9 +56,10 @@ struct Fabric {
   double specular;  // k_s
   int samples;
 };
-const Fabric kViolating[] = {{"cotton-twill-2006", cotton, 0.3, 4, 4000},  {"cotton-plain-2006", cotton, 0.2, 6, 2000},
-                             {"cotton-sateen-2006", cotton, 1.4, 3, 4000}, {"irawan-polyester", yarns, 0.5, 1, 4000},
-                             {"irawan-charmeuse", yarns, 0.8, 2, 4000},    {"irawan-denim", yarns, 0.2, 1, 200}};
+const Fabric kViolating[] = {
+    {"cotton-twill-2006", cotton, 0.3, 4, 4000},  {"cotton-plain-2006", cotton, 0.2, 6, 2000},
+    {"cotton-sateen-2006", cotton, 1.4, 3, 4000}, {"irawan-polyester", yarns, 0.5, 1, 4000},
+    {"irawan-charmeuse", yarns, 0.8, 2, 4000},    {"irawan-denim", yarns, 0.2, 1, 200}};
 
 /// The energy-safe form of kViolating[k].
 const SurfaceModel& safe_form(std::size_t k) {
@@ -79,7 +82,8 @@ double albedo(const SurfaceModel& model, const Vec3& wo, int samples, double& st
   for (int n = 0; n < samples; ++n) {
     RandomStream random(2, RandomStage::kTest, static_cast<std::uint64_t>(n), 0);
     const auto sample = model.sample(kFar, wo, random);
-    for (int c = 0; c < 3; ++c) channels[c].add(sample ? static_cast<double>(sample->weight[c]) : 0);
+    for (int c = 0; c < 3; ++c)
+      channels[c].add(sample ? static_cast<double>(sample->weight[c]) : 0);
   }
   int most = 0;
   for (int c = 1; c < 3; ++c) most = channels[c].mean() > channels[most].mean() ? c : most;
@@ -102,7 +106,8 @@ TEST(EnergyScaleLaw, NoDirectionReturnsMoreThanArrives) {
       EXPECT_LT(of_safe - 3 * error, 1) << fabric.preset << " " << wo.transpose();
       most_safe = std::max(most_safe, of_safe);
     }
-    std::printf("  %-20s largest directional albedo %.2f, energy safe %.2f\n", fabric.preset, most, most_safe);
+    std::printf("  %-20s largest directional albedo %.2f, energy safe %.2f\n", fabric.preset, most,
+                most_safe);
     EXPECT_GT(most, 1.2) << fabric.preset;
     EXPECT_GT(most_safe, 0.5) << fabric.preset << ": no darker than it must be";
   }
@@ -131,7 +136,8 @@ TEST(EnergyScaleLaw, NothingChangesWhereEnergyHolds) {
       RandomStream random(4, RandomStage::kTest, static_cast<std::uint64_t>(k), 0);
       const Vec3d wi = direction_of(k, random).cast<double>().normalized();
       const Vec3d wo = direction_of(k + 1, random).cast<double>().normalized();
-      EXPECT_TRUE((safe->reflected(kFar, wi, wo) == published->reflected(kFar, wi, wo)).all()) << fabric.preset;
+      EXPECT_TRUE((safe->reflected(kFar, wi, wo) == published->reflected(kFar, wi, wo)).all())
+          << fabric.preset;
     }
   }
 }

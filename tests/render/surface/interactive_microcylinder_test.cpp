@@ -61,7 +61,8 @@ const InteractiveMicrocylinder& linen_model(bool printed) {
   return printed ? paper : ours;
 }
 
-// Eight at a time, in single precision, without the least terms: the values are the same to this bound.
+// Eight at a time, in single precision, without the least terms: the values are the same to this
+// bound.
 TEST(InteractiveMicrocylinderAgreement, EightAtATimeAreNearTheDoubles) {
   const std::vector<Mat3> frames = {Mat3::Identity()};
   const Vec3 m = Vec3(0.6F, 0.3F, -0.4F).normalized();
@@ -85,7 +86,8 @@ TEST(InteractiveMicrocylinderAgreement, EightAtATimeAreNearTheDoubles) {
         const float sharpness = n == 5 ? 0 : std::pow(10.0F, 5 * random.uniform() - 1);
         lights.push_back(sg_light(sample_sphere(random), sharpness, Rgb(1, 2, 0.5F)));
       }
-      const PointVisibility visibility = k % 2 == 0 ? PointVisibility{} : PointVisibility{&maps, maps.coefficients(0)};
+      const PointVisibility visibility =
+          k % 2 == 0 ? PointVisibility{} : PointVisibility{&maps, maps.coefficients(0)};
       const Rgbd fast = model.shade(Mat3d::Identity(), wo, lights, visibility);
       const Rgbd slow = model.shade_in_double(Mat3d::Identity(), wo, lights, visibility);
       const double error = (fast - slow).abs().maxCoeff() / (slow.maxCoeff() + 1e-3);
@@ -96,7 +98,8 @@ TEST(InteractiveMicrocylinderAgreement, EightAtATimeAreNearTheDoubles) {
       ++count;
     }
   }
-  std::printf("  %d points: relative RMS %.2g, largest %.2g\n", count, std::sqrt(squares / norm), worst);
+  std::printf("  %d points: relative RMS %.2g, largest %.2g\n", count, std::sqrt(squares / norm),
+              worst);
   EXPECT_LT(std::sqrt(squares / norm), 1e-3);
 }
 
@@ -110,12 +113,13 @@ TEST(InteractiveMicrocylinderAgreement, ReflectedIsSadeghisModelWhereCurvesAreFl
     const Vec3d wi = upper_direction(random);
     const Vec3d wo = upper_direction(random);
     const Rgbd expected = model.published(wi, wo);
-    EXPECT_LT((interactive.reflected(wi, wo) - expected).abs().maxCoeff(), 1e-9 * expected.maxCoeff() + 1e-12);
+    EXPECT_LT((interactive.reflected(wi, wo) - expected).abs().maxCoeff(),
+              1e-9 * expected.maxCoeff() + 1e-12);
   }
 }
 
-double rms_error(const InteractiveMicrocylinder& model, float sharpness, int count, const DistanceMaps* maps,
-                 const std::function<bool(const Vec3&)>& visible) {
+double rms_error(const InteractiveMicrocylinder& model, float sharpness, int count,
+                 const DistanceMaps* maps, const std::function<bool(const Vec3&)>& visible) {
   RandomStream random(2, RandomStage::kTest, 0, 0);
   double error = 0;
   double norm = 0;
@@ -126,8 +130,9 @@ double rms_error(const InteractiveMicrocylinder& model, float sharpness, int cou
     PointVisibility visibility;
     if (maps != nullptr) visibility = {maps, maps->coefficients(0)};
     const Rgbd value = model.shade(Mat3d::Identity(), wo, {&light, 1}, visibility);
-    const Rgbd reference = ray_traced_radiance([&](const Vec3d& i, const Vec3d& o) { return model.reflected(i, o); },
-                                               Mat3d::Identity(), wo, {&light, 1}, visible, 32);
+    const Rgbd reference =
+        ray_traced_radiance([&](const Vec3d& i, const Vec3d& o) { return model.reflected(i, o); },
+                            Mat3d::Identity(), wo, {&light, 1}, visible, 32);
     error += (value - reference).square().sum();
     norm += reference.square().sum();
   }
@@ -142,8 +147,8 @@ TEST(InteractiveMicrocylinderAgreement, OpenSurfaceAgainstRayTracing) {
   for (int k = 0; k < 4; ++k) {
     const double ours = rms_error(linen_model(false), sharpnesses[k], 40, nullptr, open);
     const double printed = rms_error(linen_model(true), sharpnesses[k], 40, nullptr, open);
-    std::printf("  sharpness %4.0f: relative RMS %.4f, as printed %.4f\n", static_cast<double>(sharpnesses[k]), ours,
-                printed);
+    std::printf("  sharpness %4.0f: relative RMS %.4f, as printed %.4f\n",
+                static_cast<double>(sharpnesses[k]), ours, printed);
     EXPECT_LT(ours, limits[k]);
     EXPECT_LT(ours, printed + 0.005);
   }
@@ -172,7 +177,8 @@ TEST(InteractiveMicrocylinderLaw, EditingIsTheSameAsBuildingAnew) {
   fabric.threads[0].scattering = {1.6, Rgbd(0.5, 0.1, 0.2), 0.6, radians(14), radians(30)};
   edited.set_scattering(0, fabric.threads[0].scattering);
   const InteractiveMicrocylinder fresh(fabric, small_tables());
-  const std::vector<Light> lights = {sg_light({0.3F, 0.2F, 1}, 20), sg_light({-1, 0.2F, 0.5F}, 200)};
+  const std::vector<Light> lights = {sg_light({0.3F, 0.2F, 1}, 20),
+                                     sg_light({-1, 0.2F, 0.5F}, 200)};
   RandomStream random(3, RandomStage::kTest, 0, 0);
   for (int k = 0; k < 50; ++k) {
     const Vec3d wo = upper_direction(random);
@@ -184,7 +190,8 @@ TEST(InteractiveMicrocylinderLaw, EditingIsTheSameAsBuildingAnew) {
 TEST(InteractiveMicrocylinderLaw, TurnsWithTheWorldAndIsLinearInLight) {
   const InteractiveMicrocylinder& model = linen_model(false);
   const Mat3d turn = frame_about(Vec3(0.4F, -0.3F, 0.8F).normalized()).cast<double>();
-  std::vector<Light> lights = {sg_light({0.3F, 0.2F, 1}, 20, {1, 2, 3}), sg_light({-1, 0.2F, 0.5F}, 200)};
+  std::vector<Light> lights = {sg_light({0.3F, 0.2F, 1}, 20, {1, 2, 3}),
+                               sg_light({-1, 0.2F, 0.5F}, 200)};
   RandomStream random(4, RandomStage::kTest, 0, 0);
   const Vec3d wo = upper_direction(random);
   const Rgbd here = model.shade(Mat3d::Identity(), wo, lights, {});
@@ -198,7 +205,9 @@ TEST(InteractiveMicrocylinderLaw, TurnsWithTheWorldAndIsLinearInLight) {
   // A thousandth of the light may be left out, another for each sum.
   EXPECT_LT((first + second - here).abs().maxCoeff(), 2e-3 * here.maxCoeff());
   lights[0].irradiance *= 2;
-  EXPECT_LT((model.shade(Mat3d::Identity(), wo, {lights.data(), 1}, {}) - 2 * first).abs().maxCoeff(), 1e-12);
+  EXPECT_LT(
+      (model.shade(Mat3d::Identity(), wo, {lights.data(), 1}, {}) - 2 * first).abs().maxCoeff(),
+      1e-12);
 }
 
 TEST(InteractiveMicrocylinder, DirectionalLightsAreSeenOrNot) {
@@ -210,7 +219,8 @@ TEST(InteractiveMicrocylinder, DirectionalLightsAreSeenOrNot) {
   light.irradiance = {1, 2, 3};
   const Vec3d wo = Vec3d(0.2, 0.3, 0.8).normalized();
   light.axis = Vec3(-0.5F, 0.2F, 0.7F).normalized();
-  const Rgbd expected = light.irradiance.cast<double>() * model.reflected(light.axis.cast<double>(), wo);
+  const Rgbd expected =
+      light.irradiance.cast<double>() * model.reflected(light.axis.cast<double>(), wo);
   EXPECT_TRUE((model.shade(Mat3d::Identity(), wo, {&light, 1}, visibility) == expected).all());
   light.axis.x() *= -1;
   EXPECT_EQ(model.shade(Mat3d::Identity(), wo, {&light, 1}, visibility).maxCoeff(), 0);
@@ -237,7 +247,8 @@ TEST(InteractiveMicrocylinderStability, FiniteAndNotNegativeAnywhere) {
       wo.normalize();
       const float sharpness = k % 4 == 0 ? 0 : std::pow(10.0F, 8 * random.uniform() - 2);
       const Light light = sg_light(axis, sharpness);
-      const PointVisibility visibility = k % 2 == 0 ? PointVisibility{} : PointVisibility{&maps, maps.coefficients(0)};
+      const PointVisibility visibility =
+          k % 2 == 0 ? PointVisibility{} : PointVisibility{&maps, maps.coefficients(0)};
       const Rgbd value = model.shade(Mat3d::Identity(), wo, {&light, 1}, visibility);
       EXPECT_TRUE(value.isFinite().all() && value.minCoeff() >= 0)
           << k << ": " << wo.transpose() << " | " << axis.transpose() << " | " << sharpness << ": "
@@ -245,10 +256,13 @@ TEST(InteractiveMicrocylinderStability, FiniteAndNotNegativeAnywhere) {
     }
   }
   const Light light = sg_light({0, 0, 1}, 10);
-  EXPECT_EQ(linen_model(false).shade(Mat3d::Identity(), Vec3d(0, 0.6, -0.8), {&light, 1}, {}).maxCoeff(), 0);
+  EXPECT_EQ(
+      linen_model(false).shade(Mat3d::Identity(), Vec3d(0, 0.6, -0.8), {&light, 1}, {}).maxCoeff(),
+      0);
 }
 
-// Where W varies over a wide light it cannot be taken out of the integral (eq. 9), least so where tangents stand upright.
+// Where W varies over a wide light it cannot be taken out of the integral (eq. 9), least so where
+// tangents stand upright.
 TEST(InteractiveMicrocylinderStability, WideLightsOnUprightTangentsAreOff) {
   MicrocylinderFabric velvet;
   MicrocylinderThread thread;
@@ -265,7 +279,8 @@ TEST(InteractiveMicrocylinderStability, WideLightsOnUprightTangentsAreOff) {
   EXPECT_LT(narrow, 0.08);
 }
 
-// A disc of directions of equal shares: the mean of a constant is that constant, of a cosine the Gaussian's moment.
+// A disc of directions of equal shares: the mean of a constant is that constant, of a cosine the
+// Gaussian's moment.
 TEST(RayTracedRadianceLaw, IntegratesGaussians) {
   for (const float sharpness : {0.0F, 3.0F, 500.0F}) {
     const Light light = sg_light({0, 0, 1}, sharpness, {2, 3, 4});
@@ -273,11 +288,13 @@ TEST(RayTracedRadianceLaw, IntegratesGaussians) {
     // The share of the light above the horizon, and its cosine there.
     const double s = static_cast<double>(sharpness);
     const double above = s == 0 ? 0.5 : std::expm1(-s) / std::expm1(-2 * s);
-    const Rgbd constant = ray_traced_radiance([](const Vec3d&, const Vec3d&) { return Rgbd(1, 1, 1); },
-                                              Mat3d::Identity(), Vec3d(0, 0, 1), {&light, 1}, all, 64);
+    const Rgbd constant =
+        ray_traced_radiance([](const Vec3d&, const Vec3d&) { return Rgbd(1, 1, 1); },
+                            Mat3d::Identity(), Vec3d(0, 0, 1), {&light, 1}, all, 64);
     EXPECT_NEAR(constant[2], 4 * above, 4 * 0.01);
-    const Rgbd cosine = ray_traced_radiance([](const Vec3d& wi, const Vec3d&) { return Rgbd::Constant(wi.z()).eval(); },
-                                            Mat3d::Identity(), Vec3d(0, 0, 1), {&light, 1}, all, 64);
+    const Rgbd cosine = ray_traced_radiance(
+        [](const Vec3d& wi, const Vec3d&) { return Rgbd::Constant(wi.z()).eval(); },
+        Mat3d::Identity(), Vec3d(0, 0, 1), {&light, 1}, all, 64);
     // integral over [0, 1] of c exp(s (c - 1)) s / (1 - exp(-2 s)) dc.
     const double moment = s == 0 ? 0.25 : (1 - (-std::expm1(-s)) / s) / -std::expm1(-2 * s);
     EXPECT_NEAR(cosine[0], 2 * moment, 2 * 2e-3);

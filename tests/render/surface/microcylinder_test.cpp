@@ -61,15 +61,16 @@ Rgbd sampled(const MicrocylinderFabric& fabric, const Vec3d& wi, const Vec3d& wr
       const double phi_r = std::atan2(wr.dot(b), wr.dot(n));
       const double psi_i = std::atan2(wi.dot(t), wi.dot(n));
       const double psi_r = std::atan2(wr.dot(t), wr.dot(n));
-      const double m = blend(fabric.conventions, wrapped(phi_i - phi_r), std::max(0.0, std::cos(phi_i)),
-                             std::max(0.0, std::cos(phi_r)));
-      const double p = blend(fabric.conventions, wrapped(psi_i - psi_r), std::max(0.0, std::cos(psi_i)),
-                             std::max(0.0, std::cos(psi_r)));
+      const double m = blend(fabric.conventions, wrapped(phi_i - phi_r),
+                             std::max(0.0, std::cos(phi_i)), std::max(0.0, std::cos(phi_r)));
+      const double p = blend(fabric.conventions, wrapped(psi_i - psi_r),
+                             std::max(0.0, std::cos(psi_i)), std::max(0.0, std::cos(psi_r)));
       const double weight = thread.share / count;
       q += weight * p;
       if (m * p == 0) continue;
       const double theta_i = std::asin(wi.dot(t));
-      sum += weight * m * p * std::cos(theta_i) * scattering.value(theta_i, phi_i, std::asin(wr.dot(t)), phi_r);
+      sum += weight * m * p * std::cos(theta_i) *
+             scattering.value(theta_i, phi_i, std::asin(wr.dot(t)), phi_r);
     }
   }
   return q > 0 ? Rgbd(sum / q) : Rgbd::Zero();
@@ -83,18 +84,22 @@ TEST(MicrocylinderAgreement, ManySamplesOfTheCurveConvergeToIt) {
     for (int k = 0; k < 24; ++k) {
       fabric.conventions.width =
           k % 2 ? ThreadConventions::Width::kIwasaki : ThreadConventions::Width::kStandardDeviation;
-      fabric.conventions.fresnel = k % 4 / 2 ? ThreadConventions::Fresnel::kNormal : ThreadConventions::Fresnel::kHalf;
+      fabric.conventions.fresnel =
+          k % 4 / 2 ? ThreadConventions::Fresnel::kNormal : ThreadConventions::Fresnel::kHalf;
       fabric.conventions.blend = radians(15 + 5 * (k % 3));
       const Microcylinder model(fabric);
       const Vec3d wi = random_above(random);
-      const Vec3d wo = k < 16 ? random_above(random)
-                              : Vec3d((Vec3d(-wi.x(), -wi.y(), wi.z()) + .1 * random_above(random)).normalized());
+      const Vec3d wo =
+          k < 16
+              ? random_above(random)
+              : Vec3d((Vec3d(-wi.x(), -wi.y(), wi.z()) + .1 * random_above(random)).normalized());
       const Rgbd expected = sampled(fabric, wi, wo, 4000);
       const Rgbd value = model.reflected({}, wi, wo);
       worst = std::max(worst, (value - expected).abs().maxCoeff() / (expected.maxCoeff() + 1e-6));
     }
     std::printf("  %-26s %.2g\n", name.c_str(), worst);
-    // Ends of segments fall between samples: an error of the order of 1/4000 of a segment's share; 1e-3 leaves a factor 4.
+    // Ends of segments fall between samples: an error of the order of 1/4000 of a segment's share;
+    // 1e-3 leaves a factor 4.
     EXPECT_LT(worst, 1e-3) << name;
   }
 }
@@ -107,7 +112,8 @@ TEST(MicrocylinderLaw, PanelsResolveTheCurve) {
     for (int k = 0; k < 3000; ++k) {
       const auto [wi, wo] = random_pair_above(random, k);
       const Rgbd expected = model.published(wi, wo, 4);
-      const double error = (model.published(wi, wo) - expected).abs().maxCoeff() / (expected.maxCoeff() + 1e-300);
+      const double error =
+          (model.published(wi, wo) - expected).abs().maxCoeff() / (expected.maxCoeff() + 1e-300);
       double& slot = std::min(wi.z(), wo.z()) > std::cos(radians(89)) ? worst : worst_grazing;
       slot = std::max(slot, error);
     }
@@ -119,10 +125,12 @@ TEST(MicrocylinderLaw, PanelsResolveTheCurve) {
 
 // ---- The cylinder wrap test.
 
-/// Directions for a normal turned by beta (degrees) in the plane at `diagonal` degrees from thread 1.
+/// Directions for a normal turned by beta (degrees) in the plane at `diagonal` degrees from
+/// thread 1.
 Vec3d turned(double beta_deg, double diagonal_deg) {
   const double sine = std::sin(radians(beta_deg));
-  return {sine * std::cos(radians(diagonal_deg)), sine * std::sin(radians(diagonal_deg)), std::cos(radians(beta_deg))};
+  return {sine * std::cos(radians(diagonal_deg)), sine * std::sin(radians(diagonal_deg)),
+          std::cos(radians(beta_deg))};
 }
 
 constexpr double kHorizontal = 0;  // thread 1 in the turning plane
@@ -135,7 +143,8 @@ struct Peak {
   double height;
 };
 
-/// The light's direction where the camera is at wo: `up_deg` from it, towards the axis of the cylinder.
+/// The light's direction where the camera is at wo: `up_deg` from it, towards the axis of the
+/// cylinder.
 Vec3d light_above(const Vec3d& wo, double diagonal_deg, double up_deg) {
   return std::cos(radians(up_deg)) * wo + std::sin(radians(up_deg)) * turned(90, diagonal_deg + 90);
 }
@@ -155,20 +164,22 @@ std::vector<Peak> peaks_of(const Reflected& reflected, double diagonal_deg, doub
     double valley = 0;
     for (const int step : {-1, 1}) {
       double lowest = values[k];
-      for (auto at = static_cast<std::ptrdiff_t>(k); at >= 0 && at < static_cast<std::ptrdiff_t>(values.size());
-           at += step) {
+      for (auto at = static_cast<std::ptrdiff_t>(k);
+           at >= 0 && at < static_cast<std::ptrdiff_t>(values.size()); at += step) {
         const double value = values[static_cast<std::size_t>(at)];
         if (value > values[k]) break;
         lowest = std::min(lowest, value);
       }
       valley = std::max(valley, lowest);
     }
-    if (values[k] - valley >= 0.05 * most) peaks.push_back({-88 + 0.5 * static_cast<double>(k), values[k] / most});
+    if (values[k] - valley >= 0.05 * most)
+      peaks.push_back({-88 + 0.5 * static_cast<double>(k), values[k] / most});
   }
   return peaks;
 }
 
-void expect_peaks(const std::string& name, const std::vector<Peak>& peaks, const std::vector<Peak>& expected) {
+void expect_peaks(const std::string& name, const std::vector<Peak>& peaks,
+                  const std::vector<Peak>& expected) {
   std::printf("  %-26s", name.c_str());
   for (const Peak& peak : peaks) std::printf(" %+5.1f (%.2f)", peak.beta_deg, peak.height);
   std::printf("\n");
@@ -209,15 +220,18 @@ TEST(Microcylinder, CylinderShowsThePublishedHighlights) {
   for (const Wrap& wrap : wraps()) {
     const std::string name = wrap.name;
     const auto peaks = peaks_of(of_fabric(name), kVertical);
-    expect_peaks(name + ", v", peaks,
-                 name == "velvet" ? std::vector<Peak>{{-76.5, 1}, {76.5, 1}} : std::vector<Peak>{{0, 1}});
+    expect_peaks(
+        name + ", v", peaks,
+        name == "velvet" ? std::vector<Peak>{{-76.5, 1}, {76.5, 1}} : std::vector<Peak>{{0, 1}});
   }
 }
 
-// What the paper measures on silk with the cylinder along thread 1; not with the light at the camera.
+// What the paper measures on silk with the cylinder along thread 1; not with the light at the
+// camera.
 TEST(Microcylinder, SilkShinesAtGrazingAnglesUnderLightFromAbove) {
   const Reflected silk = of_fabric("silk-crepe-de-chine");
-  for (const auto& [up_deg, beta_deg, height] : {std::tuple{20., 67., .81}, std::tuple{30., 60., .96}}) {
+  for (const auto& [up_deg, beta_deg, height] :
+       {std::tuple{20., 67., .81}, std::tuple{30., 60., .96}}) {
     const auto peaks = peaks_of(silk, kVertical, up_deg);
     ASSERT_EQ(peaks.size(), 3u);
     EXPECT_NEAR(peaks[1].beta_deg, 0, 1e-9);
@@ -229,12 +243,15 @@ TEST(Microcylinder, SilkShinesAtGrazingAnglesUnderLightFromAbove) {
 }
 
 TEST(Microcylinder, HighlightsDoNotDependOnWhatTheTextLeavesOpen) {
-  for (const auto width : {ThreadConventions::Width::kStandardDeviation, ThreadConventions::Width::kIwasaki}) {
-    for (const auto fresnel : {ThreadConventions::Fresnel::kHalf, ThreadConventions::Fresnel::kNormal}) {
+  for (const auto width :
+       {ThreadConventions::Width::kStandardDeviation, ThreadConventions::Width::kIwasaki}) {
+    for (const auto fresnel :
+         {ThreadConventions::Fresnel::kHalf, ThreadConventions::Fresnel::kNormal}) {
       for (const double blend_deg : {15, 20, 25}) {
         for (const Wrap& wrap : wraps()) {
           if (std::string(wrap.name) == "velvet") continue;
-          const auto peaks = peaks_of(of_fabric(wrap.name, {width, fresnel, radians(blend_deg)}), kHorizontal);
+          const auto peaks =
+              peaks_of(of_fabric(wrap.name, {width, fresnel, radians(blend_deg)}), kHorizontal);
           EXPECT_EQ(peaks.size(), wrap.horizontal.size()) << wrap.name;
         }
       }
@@ -281,7 +298,9 @@ TEST(Microcylinder, ShotSilkChangesColour) {
 TEST(MicrocylinderStability, FewSamplesShowHighlightsThatAreNotThere) {
   const auto count = [](const char* name, int samples) {
     const MicrocylinderFabric fabric = fabric_called(name);
-    return peaks_of([&](const Vec3d& wi, const Vec3d& wo) { return sampled(fabric, wi, wo, samples); }, kHorizontal)
+    return peaks_of(
+               [&](const Vec3d& wi, const Vec3d& wo) { return sampled(fabric, wi, wo, samples); },
+               kHorizontal)
         .size();
   };
   EXPECT_EQ(count("polyester-charmeuse-front", 5), 5u);
@@ -312,11 +331,13 @@ TEST(MicrocylinderStability, NeverNegativeNorInfinite) {
   }
 }
 
-// Directions at which angles are not defined: along and across threads, straight up, on and below the horizon.
+// Directions at which angles are not defined: along and across threads, straight up, on and below
+// the horizon.
 TEST(MicrocylinderStability, SpecialDirections) {
   std::vector<Vec3d> directions = {{0, 0, 1}};
   for (const double z : {0.0, 1e-300, 1e-30, 1e-12, 1e-6, 0.3}) {
-    for (const Vec3d& side : {Vec3d(1, 0, 0), Vec3d(-1, 0, 0), Vec3d(0, 1, 0), Vec3d(0, -1, 0), Vec3d(.6, .8, 0)}) {
+    for (const Vec3d& side :
+         {Vec3d(1, 0, 0), Vec3d(-1, 0, 0), Vec3d(0, 1, 0), Vec3d(0, -1, 0), Vec3d(.6, .8, 0)}) {
       directions.push_back((side + Vec3d(0, 0, z)).normalized());
     }
   }
@@ -362,14 +383,15 @@ TEST(MicrocylinderStability, IsNotReciprocal) {
       const Vec3d wo = random_above(random);
       const double forth = model.reflected({}, wi, wo).mean() / wi.z();
       const double back = model.reflected({}, wo, wi).mean() / wo.z();
-      if (std::max(forth, back) > 0) differences.push_back(std::abs(forth - back) / std::max(forth, back));
+      if (std::max(forth, back) > 0)
+        differences.push_back(std::abs(forth - back) / std::max(forth, back));
     }
     std::sort(differences.begin(), differences.end());
     const double median = differences[differences.size() / 2];
-    std::printf("  %-26s |f(i,r) - f(r,i)| / max: median %.2f, largest %.2f\n", name.c_str(), median,
-                differences.back());
-    // Measured independently with other pairs as .23 to .52. A median of 400 values spread evenly over 0 to 1 has a standard
-    // error of .025; three of them either way.
+    std::printf("  %-26s |f(i,r) - f(r,i)| / max: median %.2f, largest %.2f\n", name.c_str(),
+                median, differences.back());
+    // Measured independently with other pairs as .23 to .52. A median of 400 values spread evenly
+    // over 0 to 1 has a standard error of .025; three of them either way.
     EXPECT_GT(median, .23 - .075) << name;
     EXPECT_LT(median, .52 + .075) << name;
     EXPECT_GT(differences.back(), .6) << name;
@@ -393,7 +415,8 @@ TEST(MicrocylinderStability, ReflectsMoreLightThanThereIs) {
   };
   for (const Expected& expected : all) {
     const Microcylinder model(fabric_called(expected.name));
-    const double albedo = model.directional_albedo(turned(expected.angle_deg, kHorizontal)).maxCoeff();
+    const double albedo =
+        model.directional_albedo(turned(expected.angle_deg, kHorizontal)).maxCoeff();
     std::printf("  %-26s %2.0f degrees: %.3f\n", expected.name, expected.angle_deg, albedo);
     EXPECT_NEAR(albedo, expected.albedo, expected.digit + 2e-3 * albedo) << expected.name;
   }
@@ -428,22 +451,25 @@ TEST(MicrocylinderLaw, EnergySafeReflectsNoMoreThanThereIs) {
 
 // ---- Light that is a spherical Gaussian.
 
-/// Brute force: midpoints of a dense grid in polar angle and azimuth about the light's axis, out to where it is dark.
-Rgbd brute_force_sg(const Microcylinder& model, const Vec3d& axis, double sharpness, const Vec3d& wo) {
+/// Brute force: midpoints of a dense grid in polar angle and azimuth about the light's axis, out to
+/// where it is dark.
+Rgbd brute_force_sg(const Microcylinder& model, const Vec3d& axis, double sharpness,
+                    const Vec3d& wo) {
   const double reach = std::min(kPi, 6.5 / std::sqrt(std::max(sharpness, 1e-3)));
-  const Vec3d side =
-      std::abs(axis.z()) < .9 ? axis.cross(Vec3d(0, 0, 1)).normalized() : axis.cross(Vec3d(1, 0, 0)).normalized();
+  const Vec3d side = std::abs(axis.z()) < .9 ? axis.cross(Vec3d(0, 0, 1)).normalized()
+                                             : axis.cross(Vec3d(1, 0, 0)).normalized();
   const Vec3d other = axis.cross(side);
   const int rows = reach > 1 ? 300 : 120;
   const int columns = 2 * rows;
   Rgbd sum = Rgbd::Zero();
   for (int r = 0; r < rows; ++r) {
     const double radius = (r + .5) / rows * reach;
-    const double weight = std::sin(radius) * std::exp(-2 * sharpness * std::pow(std::sin(.5 * radius), 2));
+    const double weight =
+        std::sin(radius) * std::exp(-2 * sharpness * std::pow(std::sin(.5 * radius), 2));
     for (int c = 0; c < columns; ++c) {
       const double azimuth = 2 * kPi * (c + .5) / columns;
-      const Vec3d wi =
-          std::cos(radius) * axis + std::sin(radius) * (std::cos(azimuth) * side + std::sin(azimuth) * other);
+      const Vec3d wi = std::cos(radius) * axis +
+                       std::sin(radius) * (std::cos(azimuth) * side + std::sin(azimuth) * other);
       if (wi.z() > 0) sum += weight * model.reflected({}, wi, wo);
     }
   }
@@ -478,8 +504,8 @@ TEST(MicrocylinderAgreement, GaussianLightAgainstBruteForce) {
     const Rgbd expected = brute_force_sg(model, axis, c.sharpness, wo);
     const Rgbd value = model.reflected_sg({}, axis, c.sharpness, wo);
     const double error = (value - expected).abs().maxCoeff() / expected.maxCoeff();
-    std::printf("  %-26s sharpness %6.0f: %.5f, brute force %.5f, difference %.2g\n", c.name, c.sharpness, value[0],
-                expected[0], error);
+    std::printf("  %-26s sharpness %6.0f: %.5f, brute force %.5f, difference %.2g\n", c.name,
+                c.sharpness, value[0], expected[0], error);
     // The cubature's tolerance.
     EXPECT_LT(error, 2e-3) << c.name << " " << c.sharpness;
   }
@@ -493,7 +519,8 @@ TEST(MicrocylinderLaw, ASharpGaussianLightIsADirection) {
       const Vec3d axis = (random_above(random) + Vec3d(0, 0, .2)).normalized();
       const Vec3d wo = (random_above(random) + Vec3d(0, 0, .2)).normalized();
       const Rgbd expected = model.reflected({}, axis, wo);
-      EXPECT_LT((model.reflected_sg({}, axis, 1e8, wo) - expected).abs().maxCoeff(), 2e-3 * expected.maxCoeff() + 1e-9)
+      EXPECT_LT((model.reflected_sg({}, axis, 1e8, wo) - expected).abs().maxCoeff(),
+                2e-3 * expected.maxCoeff() + 1e-9)
           << name;
     }
   }
@@ -519,8 +546,11 @@ TEST(MicrocylinderStatistical, SamplesFollowTheDensity) {
         const auto sample = model.sample({}, wo, random);
         return sample ? Vec3d(sample->wi.cast<double>()) : Vec3d(0, 0, -1);
       };
-      const auto density = [&](const Vec3d& wi) { return static_cast<double>(model.pdf({}, wi.cast<float>(), wo)); };
-      EXPECT_TRUE(chi_square_accepts(name, draw, density, 60'000, tests, window)) << name << " " << wo.transpose();
+      const auto density = [&](const Vec3d& wi) {
+        return static_cast<double>(model.pdf({}, wi.cast<float>(), wo));
+      };
+      EXPECT_TRUE(chi_square_accepts(name, draw, density, 60'000, tests, window))
+          << name << " " << wo.transpose();
     }
   }
 }
@@ -541,11 +571,14 @@ TEST(MicrocylinderStatistical, WeightsAverageToTheIntegral) {
         mean.add(weight);
         most = std::max(most, weight);
       }
-      // Constant light from everywhere of irradiance 1 has radiance 1 / 4 pi; the cubature is good to 1e-3.
-      const double expected = 4 * kPi * model.reflected_sg({}, Vec3d(0, 0, 1), 0, wo.cast<double>()).mean();
-      EXPECT_TRUE(means_agree(name, mean.mean(), mean.standard_error(), expected, 3e-4 * expected, tests));
-      std::printf("    largest weight %.1f times the mean, deviation %.2f times the mean\n", most / mean.mean(),
-                  mean.standard_error() * std::sqrt(20'000.0) / mean.mean());
+      // Constant light from everywhere of irradiance 1 has radiance 1 / 4 pi; the cubature is good
+      // to 1e-3.
+      const double expected =
+          4 * kPi * model.reflected_sg({}, Vec3d(0, 0, 1), 0, wo.cast<double>()).mean();
+      EXPECT_TRUE(
+          means_agree(name, mean.mean(), mean.standard_error(), expected, 3e-4 * expected, tests));
+      std::printf("    largest weight %.1f times the mean, deviation %.2f times the mean\n",
+                  most / mean.mean(), mean.standard_error() * std::sqrt(20'000.0) / mean.mean());
     }
   }
 }
@@ -557,9 +590,12 @@ TEST(MicrocylinderStatistical, SampleCarriesItsDensity) {
   for (int k = 0; k < 200; ++k) {
     const auto sample = model.sample({}, wo, random);
     if (!sample) continue;
-    // The direction in double and rounded to float: 1e-7 radians, where the narrowest lobe is 0.14 wide.
+    // The direction in double and rounded to float: 1e-7 radians, where the narrowest lobe is 0.14
+    // wide.
     EXPECT_NEAR(sample->pdf, model.pdf({}, sample->wi, wo), 1e-5F * sample->pdf);
-    const Rgb expected = model.reflected({}, sample->wi.cast<double>(), wo.cast<double>()).cast<float>() / sample->pdf;
+    const Rgb expected =
+        model.reflected({}, sample->wi.cast<double>(), wo.cast<double>()).cast<float>() /
+        sample->pdf;
     EXPECT_LT((sample->weight - expected).abs().maxCoeff(), 2e-5F * expected.maxCoeff());
   }
 }
@@ -579,7 +615,8 @@ std::string error_of(const std::string& text) {
 TEST(MicrocylinderFormat, ErrorsNameWhatIsWrong) {
   const std::string head = "model = \"microcylinder\"\n";
   const std::string thread =
-      "[[thread]]\ndirection = 1\nshare = 0.6\nior = 1.4\nalbedo = [0, 0.5, 1]\nkd = 0.2\ngamma_s_deg = 3\n"
+      "[[thread]]\ndirection = 1\nshare = 0.6\nior = 1.4\nalbedo = [0, 0.5, 1]\nkd = "
+      "0.2\ngamma_s_deg = 3\n"
       "gamma_v_deg = 6\noffsets_deg = [-10, 10]\nlengths = [1]\n";
   EXPECT_EQ(error_of(head + thread), "");
   const auto with = [&](const std::string& line) {
@@ -602,7 +639,8 @@ TEST(MicrocylinderFormat, ErrorsNameWhatIsWrong) {
       {head + "colour = 1\n" + thread, "colour"},
       {"model = \"velour\"\n" + thread, "microcylinder"},
   };
-  for (const auto& [text, message] : bad) EXPECT_NE(error_of(text).find(message), std::string::npos) << error_of(text);
+  for (const auto& [text, message] : bad)
+    EXPECT_NE(error_of(text).find(message), std::string::npos) << error_of(text);
 }
 
 }  // namespace

@@ -13,10 +13,13 @@ namespace {
 
 TEST(SurfacePresets, AreTheConfigsWithAModel) {
   std::vector<std::string> expected;
-  for (const auto& entry : std::filesystem::directory_iterator(HEDDLE_SOURCE_DIR "/configs/fabrics")) {
-    if (entry.path().extension() != ".toml" || !TomlTable::load(entry.path()).has("model")) continue;
+  for (const auto& entry :
+       std::filesystem::directory_iterator(HEDDLE_SOURCE_DIR "/configs/fabrics")) {
+    if (entry.path().extension() != ".toml" || !TomlTable::load(entry.path()).has("model"))
+      continue;
     expected.push_back(entry.path().stem().string());
-    EXPECT_EQ(surface_preset(expected.back()).canonical_text(), TomlTable::load(entry.path()).canonical_text());
+    EXPECT_EQ(surface_preset(expected.back()).canonical_text(),
+              TomlTable::load(entry.path()).canonical_text());
   }
   std::sort(expected.begin(), expected.end());
   EXPECT_EQ(surface_preset_names(), expected);
@@ -39,7 +42,8 @@ TEST(SurfacePresetsFormat, AnUnknownNameListsTheKnownOnes) {
   } catch (const ConfigError& error) {
     const std::string message = error.what();
     EXPECT_NE(message.find("denim"), std::string::npos);
-    for (const std::string& name : surface_preset_names()) EXPECT_NE(message.find(name), std::string::npos);
+    for (const std::string& name : surface_preset_names())
+      EXPECT_NE(message.find(name), std::string::npos);
   }
 }
 

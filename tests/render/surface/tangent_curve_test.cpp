@@ -8,13 +8,15 @@ namespace heddle {
 namespace {
 
 // Share of the curve with an angle up to `limit`, from the control points.
-double share_below(const std::vector<double>& offsets, const std::vector<double>& lengths, double limit) {
+double share_below(const std::vector<double>& offsets, const std::vector<double>& lengths,
+                   double limit) {
   double below = 0;
   double total = 0;
   for (std::size_t k = 0; k < lengths.size(); ++k) {
     const double low = std::min(offsets[k], offsets[k + 1]);
     const double high = std::max(offsets[k], offsets[k + 1]);
-    const double share = high > low ? std::clamp((limit - low) / (high - low), 0.0, 1.0) : (limit >= low ? 1.0 : 0.0);
+    const double share = high > low ? std::clamp((limit - low) / (high - low), 0.0, 1.0)
+                                    : (limit >= low ? 1.0 : 0.0);
     below += lengths[k] * share;
     total += lengths[k];
   }
@@ -25,8 +27,9 @@ double share_below(const std::vector<TangentPiece>& pieces, double limit) {
   double below = 0;
   for (const TangentPiece& piece : pieces) {
     below +=
-        piece.share * (piece.end > piece.begin ? std::clamp((limit - piece.begin) / (piece.end - piece.begin), 0.0, 1.0)
-                                               : (limit >= piece.begin ? 1.0 : 0.0));
+        piece.share * (piece.end > piece.begin
+                           ? std::clamp((limit - piece.begin) / (piece.end - piece.begin), 0.0, 1.0)
+                           : (limit >= piece.begin ? 1.0 : 0.0));
   }
   return below;
 }
@@ -58,7 +61,8 @@ TEST(TangentCurve, JoinsWhatIsOneSlope) {
   EXPECT_EQ(tangent_distribution({-1, 0, 1}, {2, 2}).size(), 1u);
   EXPECT_EQ(tangent_distribution({-1, 1, -1}, {1, 2}).size(), 1u);
   EXPECT_EQ(tangent_distribution({-1, 0, 1}, {1, 2}).size(), 2u);
-  EXPECT_EQ(tangent_distribution({2, 2, 5, 5, 2, 2}, {1, 0, 1, 0, 1}).size(), 2u) << "two atoms, one of them twice";
+  EXPECT_EQ(tangent_distribution({2, 2, 5, 5, 2, 2}, {1, 0, 1, 0, 1}).size(), 2u)
+      << "two atoms, one of them twice";
 }
 
 }  // namespace

@@ -12,7 +12,8 @@
 namespace heddle {
 namespace {
 
-ThreadParameters parameters(double ior, const Rgbd& albedo, double kd, double gamma_s_deg, double gamma_v_deg) {
+ThreadParameters parameters(double ior, const Rgbd& albedo, double kd, double gamma_s_deg,
+                            double gamma_v_deg) {
   return {ior, albedo, kd, radians(gamma_s_deg), radians(gamma_v_deg)};
 }
 
@@ -30,27 +31,34 @@ const ThreadParameters kThreads[] = {
 
 double exact_reflectance(double ior, double angle) {
   const double inside = std::asin(std::sin(angle) / ior);
-  const double s = (std::cos(angle) - ior * std::cos(inside)) / (std::cos(angle) + ior * std::cos(inside));
-  const double p = (ior * std::cos(angle) - std::cos(inside)) / (ior * std::cos(angle) + std::cos(inside));
+  const double s =
+      (std::cos(angle) - ior * std::cos(inside)) / (std::cos(angle) + ior * std::cos(inside));
+  const double p =
+      (ior * std::cos(angle) - std::cos(inside)) / (ior * std::cos(angle) + std::cos(inside));
   return 0.5 * (s * s + p * p);
 }
 
 // Equations 2 to 4 as printed, from angles.
-Rgbd printed(const ThreadParameters& thread, const ThreadConventions& conventions, double theta_i, double phi_i,
-             double theta_r, double phi_r) {
+Rgbd printed(const ThreadParameters& thread, const ThreadConventions& conventions, double theta_i,
+             double phi_i, double theta_r, double phi_r) {
   const double phi_d = std::remainder(phi_i - phi_r, 2 * kPi);
   const double theta_h = 0.5 * (theta_i + theta_r);
   const double theta_d = 0.5 * (theta_i - theta_r);
   const auto g = [&](double width) {
     return conventions.width == ThreadConventions::Width::kIwasaki
                ? std::exp(-theta_h * theta_h / (width * width)) / (std::sqrt(kPi) * width)
-               : std::exp(-0.5 * theta_h * theta_h / (width * width)) / (std::sqrt(2 * kPi) * width);
+               : std::exp(-0.5 * theta_h * theta_h / (width * width)) /
+                     (std::sqrt(2 * kPi) * width);
   };
-  const double reflected = exact_reflectance(thread.ior, std::acos(std::cos(theta_d) * std::cos(0.5 * phi_d)));
+  const double reflected =
+      exact_reflectance(thread.ior, std::acos(std::cos(theta_d) * std::cos(0.5 * phi_d)));
   double entering = (1 - reflected) * (1 - reflected);
   if (conventions.fresnel == ThreadConventions::Fresnel::kNormal) {
-    entering = (1 - exact_reflectance(thread.ior, std::acos(std::max(0.0, std::cos(theta_i) * std::cos(phi_i))))) *
-               (1 - exact_reflectance(thread.ior, std::acos(std::max(0.0, std::cos(theta_r) * std::cos(phi_r)))));
+    entering =
+        (1 - exact_reflectance(thread.ior,
+                               std::acos(std::max(0.0, std::cos(theta_i) * std::cos(phi_i))))) *
+        (1 - exact_reflectance(thread.ior,
+                               std::acos(std::max(0.0, std::cos(theta_r) * std::cos(phi_r)))));
   }
   const double surface = reflected * std::cos(0.5 * phi_d) * g(thread.gamma_s);
   const Rgbd volume = entering * ((1 - thread.kd) * g(thread.gamma_v) + thread.kd) /
@@ -78,10 +86,12 @@ TEST(ThreadScatteringAgreement, IsThePrintedEquations) {
         const ThreadScattering scattering(thread, conventions);
         for (int k = 0; k < 500; ++k) {
           const Angles a = random_angles(random, 89);
-          const Rgbd expected = printed(thread, conventions, a.theta_i, a.phi_i, a.theta_r, a.phi_r);
+          const Rgbd expected =
+              printed(thread, conventions, a.theta_i, a.phi_i, a.theta_r, a.phi_r);
           const Rgbd value = scattering.value(a.theta_i, a.phi_i, a.theta_r, a.phi_r);
           // Far from the cone all is 0 but for rounding.
-          worst = std::max(worst, (value - expected).abs().maxCoeff() / (expected.maxCoeff() + 1e-6));
+          worst =
+              std::max(worst, (value - expected).abs().maxCoeff() / (expected.maxCoeff() + 1e-6));
         }
       }
     }
@@ -93,7 +103,8 @@ TEST(ThreadScatteringAgreement, IsThePrintedEquations) {
 
 TEST(ThreadScatteringLaw, IsReciprocalToTheLastBit) {
   RandomStream random(2, RandomStage::kTest, 0, 0);
-  for (const auto fresnel : {ThreadConventions::Fresnel::kHalf, ThreadConventions::Fresnel::kNormal}) {
+  for (const auto fresnel :
+       {ThreadConventions::Fresnel::kHalf, ThreadConventions::Fresnel::kNormal}) {
     ThreadConventions conventions;
     conventions.fresnel = fresnel;
     for (const ThreadParameters& thread : kThreads) {
@@ -112,14 +123,15 @@ TEST(ThreadScattering, AngleOfHalfTangent) {
   double worst = 0;
   for (int k = 1; k <= 1000; ++k) {
     const double t = k / 1000.0;
-    worst = std::max(worst, std::abs(angle_of_half_tangent<1>(Lanes<1>(t))[0] / (2 * std::atan(t)) - 1));
+    worst = std::max(worst,
+                     std::abs(angle_of_half_tangent<1>(Lanes<1>(t))[0] / (2 * std::atan(t)) - 1));
   }
   EXPECT_LT(worst, 5e-14);
   EXPECT_EQ(angle_of_half_tangent<1>(Lanes<1>(0.0))[0], 0);
 }
 
-// Integral over all directions of f_s cos(theta_r): the energy of one scattering in the normalisation of Marschner et al.
-// 2003. Returns {all, surface part}.
+// Integral over all directions of f_s cos(theta_r): the energy of one scattering in the
+// normalisation of Marschner et al. 2003. Returns {all, surface part}.
 std::pair<double, double> energy(const ThreadParameters& thread, double theta_i) {
   ThreadParameters black = thread;
   black.albedo = Rgbd::Zero();
@@ -133,27 +145,31 @@ std::pair<double, double> energy(const ThreadParameters& thread, double theta_i)
     const QuadratureRule phis = gauss_legendre_panels(12, -kPi, kPi, {-2, -1, 0, 1, 2});
     return integrate(thetas, [&](double theta_r) {
       const double cosine = std::cos(theta_r);
-      return cosine * cosine *
-             integrate(phis, [&](double phi) { return scattering.value(theta_i, 0, theta_r, phi).maxCoeff(); });
+      return cosine * cosine * integrate(phis, [&](double phi) {
+               return scattering.value(theta_i, 0, theta_r, phi).maxCoeff();
+             });
     });
   };
   return {integral(all), integral(surface)};
 }
 
-// Not conserved: measured independently as .75 to 3.2 at 0 degrees and 5.0 to 11.1 at 85, the surface part alone .30 to .59
-// and 2.5 to 4.7. Half a unit of the last digit given.
+// Not conserved: measured independently as .75 to 3.2 at 0 degrees and 5.0 to 11.1 at 85, the
+// surface part alone .30 to .59 and 2.5 to 4.7. Half a unit of the last digit given.
 TEST(ThreadScatteringStability, CreatesEnergy) {
   struct Expected {
     double theta_deg, least, most, least_surface, most_surface, digit;
   };
-  for (const Expected& expected : {Expected{0, .75, 3.2, .30, .59, .05}, Expected{85, 5.0, 11.1, 2.5, 4.7, .05}}) {
+  for (const Expected& expected :
+       {Expected{0, .75, 3.2, .30, .59, .05}, Expected{85, 5.0, 11.1, 2.5, 4.7, .05}}) {
     double least = 1e9, most = 0, least_surface = 1e9, most_surface = 0;
     for (const ThreadParameters& thread : kThreads) {
-      if (&thread == &kThreads[std::size(kThreads) - 1]) continue;  // velvet, nearly black: not among those measured
+      // velvet, nearly black: not among those measured
+      if (&thread == &kThreads[std::size(kThreads) - 1]) continue;
       const auto [all, surface] = energy(thread, radians(expected.theta_deg));
       std::printf("  theta_i %2.0f: %7.3f, surface part %7.3f\n", expected.theta_deg, all, surface);
       least = std::min(least, all), most = std::max(most, all);
-      least_surface = std::min(least_surface, surface), most_surface = std::max(most_surface, surface);
+      least_surface = std::min(least_surface, surface),
+      most_surface = std::max(most_surface, surface);
     }
     EXPECT_NEAR(least, expected.least, expected.digit);
     EXPECT_NEAR(most, expected.most, expected.digit);
@@ -165,7 +181,9 @@ TEST(ThreadScatteringStability, CreatesEnergy) {
 // 1 / cos^2 theta_d: silk's flat thread in its mirror direction.
 TEST(ThreadScatteringStability, IsNotBounded) {
   const ThreadScattering silk(kThreads[1], {});
-  const auto mirror = [&](double degrees) { return silk.value(radians(degrees), 0, -radians(degrees), 0).maxCoeff(); };
+  const auto mirror = [&](double degrees) {
+    return silk.value(radians(degrees), 0, -radians(degrees), 0).maxCoeff();
+  };
   EXPECT_NEAR(mirror(80), 63, .5);
   EXPECT_NEAR(mirror(85), 384, .5);
   EXPECT_NEAR(mirror(89), 1.4e4, 500);

@@ -37,7 +37,8 @@ MicrocylinderFabric plain(double share) {
 
 TEST(TangentSamples, StandForTheWholeCurve) {
   MicrocylinderFabric fabric;
-  fabric.threads = {thread_of(1, 0.7, {-35, -35, 35, 35}, {1, 2, 1}), thread_of(2, 0.3, {0, 0}, {1})};
+  fabric.threads = {thread_of(1, 0.7, {-35, -35, 35, 35}, {1, 2, 1}),
+                    thread_of(2, 0.3, {0, 0}, {1})};
   const std::vector<TangentSample> samples = tangent_samples(fabric, 20);
   std::vector<double> share(2, 0.0);
   for (const TangentSample& sample : samples) {
@@ -84,8 +85,10 @@ TEST(ThreadWeightsLaw, SharesOfOneAtMost) {
     // M = P = 1 in the middle.
     if (k > 0) continue;
     const Vec3d up(0, 0, 1);
-    const MicrocylinderFabric flat = {{}, false, {thread_of(1, 0.5, {0, 0}, {1}), thread_of(2, 0.5, {0, 0}, {1})}};
-    const std::vector<double> straight = thread_weights(flat, tangent_samples(flat, 4), Weighting::kConsistent, up, up);
+    const MicrocylinderFabric flat = {
+        {}, false, {thread_of(1, 0.5, {0, 0}, {1}), thread_of(2, 0.5, {0, 0}, {1})}};
+    const std::vector<double> straight =
+        thread_weights(flat, tangent_samples(flat, 4), Weighting::kConsistent, up, up);
     EXPECT_NEAR(straight[0] + straight[1], 1, 1e-12);
   }
   const std::vector<double> below =
@@ -93,7 +96,8 @@ TEST(ThreadWeightsLaw, SharesOfOneAtMost) {
   for (const double weight : below) EXPECT_EQ(weight, 0);
 }
 
-// Two threads of one half with equally many samples, no gap: the printed weights are half of Sadeghi's.
+// Two threads of one half with equally many samples, no gap: the printed weights are half of
+// Sadeghi's.
 TEST(ThreadWeightsLaw, PrintedWeightsAreHalf) {
   const MicrocylinderFabric fabric = plain(0.5);
   const std::vector<TangentSample> tangents = tangent_samples(fabric, 16);
@@ -101,9 +105,12 @@ TEST(ThreadWeightsLaw, PrintedWeightsAreHalf) {
   for (int k = 0; k < 200; ++k) {
     const Vec3d wi = upper_direction(random);
     const Vec3d wo = upper_direction(random);
-    const std::vector<double> consistent = thread_weights(fabric, tangents, Weighting::kConsistent, wi, wo);
-    const std::vector<double> printed = thread_weights(fabric, tangents, Weighting::kPrinted, wi, wo);
-    for (std::size_t t = 0; t < tangents.size(); ++t) EXPECT_NEAR(printed[t], 0.5 * consistent[t], 1e-13);
+    const std::vector<double> consistent =
+        thread_weights(fabric, tangents, Weighting::kConsistent, wi, wo);
+    const std::vector<double> printed =
+        thread_weights(fabric, tangents, Weighting::kPrinted, wi, wo);
+    for (std::size_t t = 0; t < tangents.size(); ++t)
+      EXPECT_NEAR(printed[t], 0.5 * consistent[t], 1e-13);
   }
 }
 
@@ -111,16 +118,18 @@ TEST(ThreadWeightsLaw, GapsTakeTheirShareOfTheConsistentWeights) {
   const std::vector<TangentSample> tangents = tangent_samples(plain(0.5), 16);
   const Vec3d up(0, 0, 1);
   double sum = 0;
-  for (const double w : thread_weights(plain(0.25), tangents, Weighting::kConsistent, up, up)) sum += w;
+  for (const double w : thread_weights(plain(0.25), tangents, Weighting::kConsistent, up, up))
+    sum += w;
   double full = 0;
-  for (const double w : thread_weights(plain(0.5), tangents, Weighting::kConsistent, up, up)) full += w;
+  for (const double w : thread_weights(plain(0.5), tangents, Weighting::kConsistent, up, up))
+    full += w;
   // <M P> / (<P> + 1) against <M P> / <P>, P = cos of three tangents within +-25 degrees.
   const double p = (1 + 2 * std::cos(radians(50.0 / 3))) / 3;
   EXPECT_NEAR(sum / full, p / (p + 1), 1e-12);
 }
 
-double direct(const MicrocylinderFabric& fabric, const std::vector<TangentSample>& tangents, std::size_t tangent,
-              const Vec3d& axis, double sharpness, const Vec3d& wo) {
+double direct(const MicrocylinderFabric& fabric, const std::vector<TangentSample>& tangents,
+              std::size_t tangent, const Vec3d& axis, double sharpness, const Vec3d& wo) {
   constexpr int kRows = 60;
   double sum = 0;
   double whole = 0;
@@ -128,7 +137,8 @@ double direct(const MicrocylinderFabric& fabric, const std::vector<TangentSample
     const double polar = 0.5 * kPi * (i + 0.5) / kRows;
     for (int j = 0; j < 4 * kRows; ++j) {
       const double azimuth = 2 * kPi * (j + 0.5) / (4 * kRows);
-      const Vec3d wi(std::sin(polar) * std::cos(azimuth), std::sin(polar) * std::sin(azimuth), std::cos(polar));
+      const Vec3d wi(std::sin(polar) * std::cos(azimuth), std::sin(polar) * std::sin(azimuth),
+                     std::cos(polar));
       const double value = std::sin(polar) * std::exp(sharpness * (wi.dot(axis) - 1));
       whole += value;
       if (value < 1e-9) continue;
@@ -156,7 +166,8 @@ TEST(WeightingTableAgreement, TableAgainstDirectAverages) {
     Vec3d axis = upper_direction(random);
     if (k % 8 == 0) axis.z() *= -0.3;
     axis.normalize();
-    const double sharpness = (std::vector<double>{0, 1, 5, 40, 300})[static_cast<std::size_t>(k % 5)];
+    const double sharpness =
+        (std::vector<double>{0, 1, 5, 40, 300})[static_cast<std::size_t>(k % 5)];
     const auto t = static_cast<std::size_t>(k) % tangents.size();
     const double exact = direct(fabric, tangents, t, axis, sharpness, wo);
     const double value = table.value(t, table.outgoing(wo), axis, sharpness);
@@ -200,9 +211,11 @@ TEST(WeightingTableAgreement, EightAtATime) {
     Vec8 axes;
     Float8 sharpness;
     for (int lane = 0; lane < 8; ++lane) {
-      // On the frame's axes too, but for the nadir, whose value depends on the azimuth from which it is reached.
+      // On the frame's axes too, but for the nadir, whose value depends on the azimuth from which
+      // it is reached.
       const bool on_axis = lane == k % 8 && k % 6 != 5;
-      const Vec3 axis = on_axis ? Vec3(Vec3::Unit(k % 3) * (k % 2 == 0 ? 1 : -1)) : sample_sphere(random);
+      const Vec3 axis =
+          on_axis ? Vec3(Vec3::Unit(k % 3) * (k % 2 == 0 ? 1 : -1)) : sample_sphere(random);
       axes.x[lane] = axis.x();
       axes.y[lane] = axis.y();
       axes.z[lane] = axis.z();
@@ -228,9 +241,13 @@ TEST_F(WeightingTableFormat, ReadsWhatItWrote) {
   const WeightingTable table(fabric, tangent_samples(fabric, 3), Weighting::kConsistent, settings);
   table.write(folder_ / "table.safetensors", {{"key", "abc"}});
   EXPECT_EQ(TensorFile::read(folder_ / "table.safetensors").metadata_value("key"), "abc");
-  const WeightingTable read = WeightingTable::read(folder_ / "table.safetensors", table.ranks().size());
+  const WeightingTable read =
+      WeightingTable::read(folder_ / "table.safetensors", table.ranks().size());
   EXPECT_EQ(read.ranks(), table.ranks());
-  EXPECT_NE(error_of([&] { WeightingTable::read(folder_ / "table.safetensors", 9); }).find("not the sizes"), std::string::npos)
+  EXPECT_NE(error_of([&] {
+              WeightingTable::read(folder_ / "table.safetensors", 9);
+            }).find("not the sizes"),
+            std::string::npos)
       << "of another fabric";
   EXPECT_EQ(read.bytes(), table.bytes());
   RandomStream random(8, RandomStage::kTest, 0, 0);
@@ -238,12 +255,14 @@ TEST_F(WeightingTableFormat, ReadsWhatItWrote) {
     const Vec3d wo = upper_direction(random);
     const Vec3d axis = upper_direction(random);
     const std::size_t t = static_cast<std::size_t>(k) % table.ranks().size();
-    EXPECT_EQ(read.value(t, read.outgoing(wo), axis, 3.0 * k), table.value(t, table.outgoing(wo), axis, 3.0 * k));
+    EXPECT_EQ(read.value(t, read.outgoing(wo), axis, 3.0 * k),
+              table.value(t, table.outgoing(wo), axis, 3.0 * k));
   }
 }
 
 TEST_F(WeightingTableFormat, SizesThatDoNotFitAreNamed) {
-  const auto message = [&](std::vector<std::int32_t> grid, std::vector<std::int32_t> ranks, std::size_t outgoing) {
+  const auto message = [&](std::vector<std::int32_t> grid, std::vector<std::int32_t> ranks,
+                           std::size_t outgoing) {
     TensorFileWriter file;
     file.add<std::int32_t>("grid", {grid.size()}, grid);
     file.add<std::int32_t>("ranks", {ranks.size()}, ranks);
@@ -254,7 +273,8 @@ TEST_F(WeightingTableFormat, SizesThatDoNotFitAreNamed) {
   };
   EXPECT_EQ(message({2, 4, 4}, {1}, 64), "no error");
   for (const auto& ranks : {std::vector<std::int32_t>{9}, {1, 1}, {0}, {-1}, {2000000000}}) {
-    EXPECT_NE(message({2, 4, 4}, ranks, 64).find("bad.safetensors: not the sizes"), std::string::npos);
+    EXPECT_NE(message({2, 4, 4}, ranks, 64).find("bad.safetensors: not the sizes"),
+              std::string::npos);
   }
   EXPECT_NE(message({2, 4, 4}, {1}, 65).find("sizes"), std::string::npos);
   EXPECT_NE(message({1, 8, 4}, {1}, 32).find("sizes"), std::string::npos);

@@ -17,11 +17,13 @@ namespace heddle {
 namespace {
 
 std::string config(const std::string& more = "", double diffuse = 0.05) {
-  const std::string colors = "diffuse = [" + std::to_string(diffuse) + ", 0.02, 0]\nspecular = [0.5, 0.7, 0.9]\n";
-  return "model = \"woven-cotton\"\nunit_mm = 0.25\n[weave]\nnotation = \"twill 3/1\"\nend_widths = [1]\n"
+  const std::string colors =
+      "diffuse = [" + std::to_string(diffuse) + ", 0.02, 0]\nspecular = [0.5, 0.7, 0.9]\n";
+  return "model = \"woven-cotton\"\nunit_mm = 0.25\n[weave]\nnotation = \"twill 3/1\"\nend_widths "
+         "= [1]\n"
          "pick_widths = [2]\n[warp]\n" +
-         colors + "semimajor = 3\neccentricity = 0.995\nangle_deg = 95\nk = [1.5, 3.1]\n[weft]\n" + colors +
-         "semimajor = 1\neccentricity = 0.9\nangle_deg = 80\nk = [3.7, 1.6]\n" + more;
+         colors + "semimajor = 3\neccentricity = 0.995\nangle_deg = 95\nk = [1.5, 3.1]\n[weft]\n" +
+         colors + "semimajor = 1\neccentricity = 0.9\nangle_deg = 80\nk = [3.7, 1.6]\n" + more;
 }
 
 const char* const kIrregular = "[irregularity]\nangle_deg = 8\nshift = 0.1\nsize = 0.2\n";
@@ -41,8 +43,8 @@ Vec3d random_direction(RandomStream& random, double min_z = 0.0) {
 const SurfacePoint kFar = {Vec2(0.3F, 0.1F), 1000.0F};
 
 /// Mean of the values at a grid of points over `size` mm, each seen with the footprint.
-Rgbd mean_over(const WovenCotton& model, const Vec2d& low, const Vec2d& size, int grid, float footprint,
-               const Vec3d& wi, const Vec3d& wo) {
+Rgbd mean_over(const WovenCotton& model, const Vec2d& low, const Vec2d& size, int grid,
+               float footprint, const Vec3d& wi, const Vec3d& wo) {
   Rgbd sum = Rgbd::Zero();
   for (int i = 0; i < grid; ++i) {
     for (int j = 0; j < grid; ++j) {
@@ -77,7 +79,8 @@ TEST(WovenCottonLaw, MeanOverARepeatIsTheBrdfAtEveryFootprint) {
   const Rgbd far = model.reflected(kFar, wi, wo);
   const Rgbd near = model.reflected({Vec2(0.05F, 0.3F), 0}, wi, wo);
   for (const float footprint : {0.1F, 0.4F, 1.3F, 2.3F, 3.7F}) {
-    // Values are averages over the footprint, so piecewise smooth in the position: the midpoint rule errs by (cell / footprint)^2.
+    // Values are averages over the footprint, so piecewise smooth in the position: the midpoint
+    // rule errs by (cell / footprint)^2.
     const Rgbd mean = mean_over(model, {0.01, 0.02}, repeat, 200, footprint, wi, wo);
     EXPECT_LT((mean / far - 1.0).abs().maxCoeff(), 1e-3) << footprint;
   }
@@ -95,8 +98,8 @@ TEST(WovenCottonAgreement, FootprintIsTheMeanOverItsSquare) {
       const Vec3d wo = random_direction(random, 0.7);
       const Vec2d at(10.0 * random.uniform_double(), 10.0 * random.uniform_double());
       const Rgbd value = model.reflected({at.cast<float>(), static_cast<float>(footprint)}, wi, wo);
-      const Rgbd mean =
-          mean_over(model, at - Vec2d::Constant(0.5 * footprint), Vec2d::Constant(footprint), 700, 0.0F, wi, wo);
+      const Rgbd mean = mean_over(model, at - Vec2d::Constant(0.5 * footprint),
+                                  Vec2d::Constant(footprint), 700, 0.0F, wi, wo);
       const double height = highlight_reflectance(wi, wo, 1.5) * 0.9;
       EXPECT_LT((value - mean).abs().maxCoeff(), 2e-3 * height) << footprint;
     }
@@ -125,21 +128,25 @@ TEST(WovenCottonStatistical, IrregularClothShowsTheMeanOfItsVariants) {
     const Vec3d wi = Vec3d(0.35, 0.4, 1).normalized();
     const Vec3d wo = Vec3d(-0.1, 0.2, 1).normalized();
     const double far = model.reflected(kFar, wi, wo)[0];
-    // Means over squares of half a repeat's side, far enough apart that they share no segment and no yarn.
+    // Means over squares of half a repeat's side, far enough apart that they share no segment and
+    // no yarn.
     RunningMean mean;
     for (int n = 0; n < 4000; ++n) {
       const auto along = static_cast<float>(n);
       mean.add(model.reflected({Vec2(along * 2.01F, along * 2.03F), 0.9F}, wi, wo)[0]);
     }
     EXPECT_TRUE(means_agree(per, mean.mean(), mean.standard_error(), far, 0.0, 2));
-    EXPECT_GT(std::abs(far / model_of(config()).reflected(kFar, wi, wo)[0] - 1.0), 1e-3);  // not the regular cloth's
+    // not the regular cloth's
+    EXPECT_GT(std::abs(far / model_of(config()).reflected(kFar, wi, wo)[0] - 1.0), 1e-3);
   }
 }
 
 TEST(WovenCottonLaw, IrregularityHasMeanZero) {
-  // Small deviations change the BRDF in second order only: far less than the same change of all segments does.
+  // Small deviations change the BRDF in second order only: far less than the same change of all
+  // segments does.
   for (const bool of_angle : {true, false}) {
-    WovenCottonParameters parameters = read_woven_cotton(TomlTable::parse(config("", 0.0), "test.toml"));
+    WovenCottonParameters parameters =
+        read_woven_cotton(TomlTable::parse(config("", 0.0), "test.toml"));
     const WovenCotton regular(parameters);
     WovenIrregularity irregularity;
     (of_angle ? irregularity.angle : irregularity.size) = 0.002;
@@ -178,16 +185,20 @@ TEST(WovenCotton, IrregularityIsReproducible) {
     const Vec3d wi = random_direction(random, 0.8);
     const Vec3d wo = random_direction(random, 0.8);
     EXPECT_EQ((a.reflected(point, wi, wo) - b.reflected(point, wi, wo)).abs().maxCoeff(), 0.0);
-    differ += (a.reflected(point, wi, wo) - other.reflected(point, wi, wo)).abs().maxCoeff() > 0.0 ? 1 : 0;
+    differ += (a.reflected(point, wi, wo) - other.reflected(point, wi, wo)).abs().maxCoeff() > 0.0
+                  ? 1
+                  : 0;
   }
   EXPECT_GT(differ, 200);
-  // Along a yarn with per = "yarn" every segment looks the same; here the first end, which starts with a warp float.
+  // Along a yarn with per = "yarn" every segment looks the same; here the first end, which starts
+  // with a warp float.
   const WovenCotton yarns = model_of(config(std::string(kIrregular) + "per = \"yarn\"\n"));
   const Vec3d wi = random_direction(random, 0.8);
   const Vec3d wo = random_direction(random, 0.8);
   const Rgbd value = yarns.reflected({Vec2(0.125F, 0.25F), 0.2F}, wi, wo);
   for (int n = 1; n < 20; ++n) {
-    const Rgbd further = yarns.reflected({Vec2(0.125F, 0.25F + 2.0F * static_cast<float>(n)), 0.2F}, wi, wo);
+    const Rgbd further =
+        yarns.reflected({Vec2(0.125F, 0.25F + 2.0F * static_cast<float>(n)), 0.2F}, wi, wo);
     EXPECT_LT((further - value).abs().maxCoeff(), 1e-5);  // positions are floats
   }
 }
@@ -196,7 +207,8 @@ TEST(WovenCottonLaw, BtfAndBrdfAreReciprocal) {
   const WovenCotton model = model_of(config());
   RandomStream random(5, RandomStage::kTest, 0, 0);
   for (int n = 0; n < 5000; ++n) {
-    const SurfacePoint point = {Vec2(random.uniform(), random.uniform()), n % 2 == 0 ? 100.0F : 0.5F};
+    const SurfacePoint point = {Vec2(random.uniform(), random.uniform()),
+                                n % 2 == 0 ? 100.0F : 0.5F};
     const Vec3d wi = random_direction(random, 1e-3);
     const Vec3d wo = random_direction(random, 1e-3);
     const Rgbd forth = model.reflected(point, wi, wo) / wi.z();
@@ -220,7 +232,8 @@ TEST(WovenCottonStability, FiniteAndNotNegativeForRandomAndGrazingPairs) {
       const Vec3d wo = direction();
       const Vec3d wi = n % 8 == 5 ? Vec3d(-wo.x(), -wo.y(), wo.z()) : direction();
       const float footprint = n % 3 == 0 ? 0.0F : 2.0F * random.uniform();
-      const SurfacePoint point = {Vec2(random.uniform(), random.uniform()), n % 3 == 1 ? 100.0F : footprint};
+      const SurfacePoint point = {Vec2(random.uniform(), random.uniform()),
+                                  n % 3 == 1 ? 100.0F : footprint};
       const Rgbd value = model->reflected(point, wi, wo);
       bad += value.isFinite().all() && value.minCoeff() >= 0.0 ? 0 : 1;
       const float density = model->pdf(point, wi.cast<float>(), wo.cast<float>());
@@ -248,14 +261,18 @@ TEST(WovenCottonAgreement, LightOfAnyWidthAgainstBruteForce) {
         const double theta = 0.5 * kPi * (i + 0.5) / kRows;
         for (int j = 0; j < 4 * kRows; ++j) {
           const double phi = 0.5 * kPi * (j + 0.5) / kRows;
-          const Vec3d wi(std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta));
-          sum += model.reflected(point, wi, wo) * (sg_value({axis, sharpness}, wi) * std::sin(theta));
+          const Vec3d wi(std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi),
+                         std::cos(theta));
+          sum +=
+              model.reflected(point, wi, wo) * (sg_value({axis, sharpness}, wi) * std::sin(theta));
         }
       }
       sum *= std::pow(0.5 * kPi / kRows, 2) / sg_mass(sharpness);
       const Rgbd value = model.reflected_sg(point, axis, sharpness, wo);
-      std::printf("  footprint %g, sharpness %g: %.6f, brute force %.6f\n", footprint, sharpness, value[0], sum[0]);
-      // The quadrature stops at an estimate of 1e-3; the brute force's own error on the step is below 1e-3.
+      std::printf("  footprint %g, sharpness %g: %.6f, brute force %.6f\n", footprint, sharpness,
+                  value[0], sum[0]);
+      // The quadrature stops at an estimate of 1e-3; the brute force's own error on the step is
+      // below 1e-3.
       EXPECT_LT((value / sum - 1.0).abs().maxCoeff(), 2e-3);
     }
   }
@@ -268,9 +285,9 @@ TEST(WovenCottonStatistical, SamplesFollowTheDensityAndWeighWhatTheyShould) {
   for (const char* more : weaves) {
     const WovenCotton model = model_of(config(more));
     for (const double theta_deg : {0.0, 45.0, 80.0}) {
-      const Vec3 wo =
-          Vec3d(std::sin(radians(theta_deg)) * 0.6, std::sin(radians(theta_deg)) * 0.8, std::cos(radians(theta_deg)))
-              .cast<float>();
+      const Vec3 wo = Vec3d(std::sin(radians(theta_deg)) * 0.6, std::sin(radians(theta_deg)) * 0.8,
+                            std::cos(radians(theta_deg)))
+                          .cast<float>();
       const SurfacePoint point = {Vec2(0.1F, 0.2F), 0.3F};
       RunningMean albedo;
       EXPECT_TRUE(chi_square_accepts(
@@ -284,19 +301,24 @@ TEST(WovenCottonStatistical, SamplesFollowTheDensityAndWeighWhatTheyShould) {
             return drawn->wi.cast<double>();
           },
           [&](const Vec3d& wi) -> double {
-            // What is missing to 1 is drawn as nothing; the test's cell about -z gets it by the rest it pools.
+            // What is missing to 1 is drawn as nothing; the test's cell about -z gets it by the
+            // rest it pools.
             return model.pdf(point, wi.cast<float>(), wo);
           },
-          400000, kTests, {.theta_min = -0.5 * kPi, .theta_max = 0.5 * kPi, .phi_min = 0.0, .phi_max = kPi}));
-      const double exact = kPi * 2.0 * model.reflected_sg(point, Vec3d::UnitZ(), 0.0, wo.cast<double>())[0] * 2.0;
+          400000, kTests,
+          {.theta_min = -0.5 * kPi, .theta_max = 0.5 * kPi, .phi_min = 0.0, .phi_max = kPi}));
+      const double exact =
+          kPi * 2.0 * model.reflected_sg(point, Vec3d::UnitZ(), 0.0, wo.cast<double>())[0] * 2.0;
       // The quadrature's own error: 1e-3, taken as a standard error.
-      EXPECT_TRUE(means_agree("albedo", albedo.mean(), albedo.standard_error(), exact, 1e-3 * exact, kTests));
+      EXPECT_TRUE(means_agree("albedo", albedo.mean(), albedo.standard_error(), exact, 1e-3 * exact,
+                              kTests));
     }
   }
 }
 
 TEST(WovenCotton, ConfigErrorsHaveTheirPlace) {
-  const auto message = [](std::string text, const std::string& from, const std::string& to) -> std::string {
+  const auto message = [](std::string text, const std::string& from,
+                          const std::string& to) -> std::string {
     text.replace(text.find(from), from.size(), to);
     try {
       const TomlTable document = TomlTable::parse(text, "test.toml");
@@ -307,10 +329,13 @@ TEST(WovenCotton, ConfigErrorsHaveTheirPlace) {
     return "";
   };
   EXPECT_EQ(message(config(), "unit_mm", "unit_mm"), "");
-  EXPECT_NE(message(config(), "semimajor = 3", "semimajor = 0").find("test.toml:10:"), std::string::npos);
-  EXPECT_NE(message(config(), "eccentricity = 0.995", "eccentricity = 1").find("test.toml:11:"), std::string::npos);
+  EXPECT_NE(message(config(), "semimajor = 3", "semimajor = 0").find("test.toml:10:"),
+            std::string::npos);
+  EXPECT_NE(message(config(), "eccentricity = 0.995", "eccentricity = 1").find("test.toml:11:"),
+            std::string::npos);
   EXPECT_NE(message(config(), "unit_mm", "units_mm").find("unit_mm"), std::string::npos);
-  EXPECT_NE(message(config("[irregularity]\nsize = 0.6\n"), "0.6", "0.6").find("size"), std::string::npos);
+  EXPECT_NE(message(config("[irregularity]\nsize = 0.6\n"), "0.6", "0.6").find("size"),
+            std::string::npos);
 }
 
 }  // namespace

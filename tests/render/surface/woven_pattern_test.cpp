@@ -35,7 +35,8 @@ TEST(WovenPattern, TwillHasThePapersWindows) {
 
 TEST(WovenPattern, MatrixIsReadFromTheTopRowDown) {
   // Warp on top in the lower left and upper right crossing.
-  const WovenPattern pattern = pattern_of("matrix = \"01 10\"\nend_widths = [1]\npick_widths = [1]");
+  const WovenPattern pattern =
+      pattern_of("matrix = \"01 10\"\nend_widths = [1]\npick_widths = [1]");
   EXPECT_EQ(pattern.locate({0.5, 0.5}).segment->system, YarnSystem::kWarp);
   EXPECT_EQ(pattern.locate({1.5, 0.5}).segment->system, YarnSystem::kWeft);
   EXPECT_EQ(pattern.locate({1.5, 1.5}).segment->system, YarnSystem::kWarp);
@@ -46,7 +47,8 @@ TEST(WovenPattern, EveryPointLiesInTheSegmentThatHoldsIt) {
   for (const char* keys : kPatterns) {
     const WovenPattern pattern = pattern_of(keys);
     for (int n = 0; n < 2000; ++n) {
-      const Vec2d position(200.0 * random.uniform_double() - 100.0, 200.0 * random.uniform_double() - 100.0);
+      const Vec2d position(200.0 * random.uniform_double() - 100.0,
+                           200.0 * random.uniform_double() - 100.0);
       const PlacedFloat placed = pattern.locate(position);
       const Vec2d local = position - placed.corner;
       EXPECT_GE(local.minCoeff(), -1e-12);
@@ -63,7 +65,8 @@ TEST(WovenPatternLaw, VisitedPartsTileTheRectangle) {
     const WovenPattern pattern = pattern_of(keys);
     for (int n = 0; n < 200; ++n) {
       const Vec2d low(40.0 * random.uniform_double() - 20.0, 40.0 * random.uniform_double() - 20.0);
-      const Rectangle rectangle = {low, low + 12.0 * Vec2d(random.uniform_double(), random.uniform_double())};
+      const Rectangle rectangle = {
+          low, low + 12.0 * Vec2d(random.uniform_double(), random.uniform_double())};
       double area = 0.0;
       pattern.visit(rectangle, [&](const PlacedFloat& placed, const Rectangle& part) {
         area += part.area();
@@ -83,7 +86,8 @@ TEST(WovenPatternLaw, PartsOfAFootprintAddUpToIt) {
     const WovenPattern pattern = pattern_of(keys);
     for (const double footprint : {0.0, 1e-3, 0.3, 1.0, 5.0, 6.0, 10.0, 13.0, 1000.0}) {
       double share = 0.0;
-      pattern.visit_footprint({0.7, -2.3}, footprint, [&](const FootprintPart& part) { share += part.share; });
+      pattern.visit_footprint({0.7, -2.3}, footprint,
+                              [&](const FootprintPart& part) { share += part.share; });
       EXPECT_NEAR(share, 1.0, 1e-12) << footprint;
     }
   }
@@ -105,8 +109,9 @@ TEST(WovenPattern, BadWeavesAreErrorsWithTheirPlace) {
   EXPECT_NE(message("matrix = \"\"" + widths).find("1 to 64 rows"), std::string::npos);
   EXPECT_NE(message("matrix = \"10 10\"" + widths).find("go under"), std::string::npos);
   EXPECT_NE(message("matrix = \"11 00\"" + widths).find("go under"), std::string::npos);
-  EXPECT_NE(message("notation = \"plain\"\nend_widths = [1, 2, 3]\npick_widths = [1]").find("divides"),
-            std::string::npos);
+  EXPECT_NE(
+      message("notation = \"plain\"\nend_widths = [1, 2, 3]\npick_widths = [1]").find("divides"),
+      std::string::npos);
 }
 
 }  // namespace

@@ -42,7 +42,8 @@ bool fits(const WovenSegment& segment) {
   return (segment.half_extent().array() <= 0.5 * segment.size.array()).all();
 }
 
-/// The paper's way: which of the five cases of its figure 9, and the share of the window. Case 0: none of them.
+/// The paper's way: which of the five cases of its figure 9, and the share of the window. Case 0:
+/// none of them.
 struct FiveCases {
   int which;
   double share;
@@ -92,7 +93,8 @@ FiveCases five_cases(const WovenSegment& segment, const Vec2d& half) {
   const double scale = a * b / segment.size.prod();
   if (crossings.empty() && corners_inside == 0) {
     // The centre tells whether the whole ellipse is seen or nothing.
-    const bool inside = (centre.array() > 0.0).all() && (centre.array() < segment.size.array()).all();
+    const bool inside =
+        (centre.array() > 0.0).all() && (centre.array() < segment.size.array()).all();
     return inside ? FiveCases{1, kPi * scale} : FiveCases{5, 0.0};
   }
   if (crossings.size() == 2 && crossings[0].edge == crossings[1].edge && corners_inside == 0) {
@@ -109,7 +111,9 @@ FiveCases five_cases(const WovenSegment& segment, const Vec2d& half) {
     const Crossing& exit = crossings[0].enters ? crossings[1] : crossings[0];
     const Vec2d u = corners[corner_inside] - entry.at;
     const Vec2d v = exit.at - entry.at;
-    return {4, (circular_segment(turn(entry.at, exit.at)) + 0.5 * std::abs(u.x() * v.y() - u.y() * v.x())) * scale};
+    return {4, (circular_segment(turn(entry.at, exit.at)) +
+                0.5 * std::abs(u.x() * v.y() - u.y() * v.x())) *
+                   scale};
   }
   return {0, 0.0};
 }
@@ -119,7 +123,9 @@ TEST(WovenSegmentAgreement, FiveCasesWhereTheEllipseFits) {
   int seen[6] = {};
   double worst = 0.0;
   for (int n = 0; n < 200000;) {
-    const WovenSegment segment = n % 3 == 0 ? twill_warp() : n % 3 == 1 ? twill_weft() : random_segment(random);
+    const WovenSegment segment = n % 3 == 0   ? twill_warp()
+                                 : n % 3 == 1 ? twill_weft()
+                                              : random_segment(random);
     const Vec2d half = random_half(random);
     if (!fits(segment) || segment.semiminor() < 1e-3) continue;
     ++n;
@@ -128,14 +134,16 @@ TEST(WovenSegmentAgreement, FiveCasesWhereTheEllipseFits) {
     ASSERT_NE(expected.which, 0);
     worst = std::max(worst, std::abs(highlight_share(segment, half) - expected.share));
   }
-  std::printf("  cases 1-5: %d %d %d %d %d, worst difference %.2g\n", seen[1], seen[2], seen[3], seen[4], seen[5],
-              worst);
+  std::printf("  cases 1-5: %d %d %d %d %d, worst difference %.2g\n", seen[1], seen[2], seen[3],
+              seen[4], seen[5], worst);
   for (int which = 1; which <= 5; ++which) EXPECT_GT(seen[which], 50) << which;
-  // Rounding of crossings near a tangent grows as the square root: sqrt(2.2e-16) in position, its cube in area.
+  // Rounding of crossings near a tangent grows as the square root: sqrt(2.2e-16) in position, its
+  // cube in area.
   EXPECT_LT(worst, 1e-12);
 }
 
-/// Integral over x of the height of (ellipse and rectangle), with breaks where an edge is crossed: any ellipse, any rectangle.
+/// Integral over x of the height of (ellipse and rectangle), with breaks where an edge is crossed:
+/// any ellipse, any rectangle.
 double area_by_columns(const WovenSegment& segment, const Vec2d& half, const Rectangle& rectangle) {
   const Vec2d centre = highlight_centre(segment, half);
   const double c = std::cos(segment.angle);
@@ -189,12 +197,15 @@ TEST(WovenSegmentAgreement, AnyEllipseAndAnyRectangleAgainstColumns) {
     if (n % 2 == 0) {
       const double x = segment.size.x() * random.uniform_double();
       const double y = segment.size.y() * random.uniform_double();
-      rectangle = {{x, y}, {x + (segment.size.x() - x) * random.uniform_double(), segment.size.y()}};
+      rectangle = {{x, y},
+                   {x + (segment.size.x() - x) * random.uniform_double(), segment.size.y()}};
     }
-    const double difference = highlight_area(segment, half, rectangle) - area_by_columns(segment, half, rectangle);
+    const double difference =
+        highlight_area(segment, half, rectangle) - area_by_columns(segment, half, rectangle);
     worst = std::max(worst, std::abs(difference) / segment.size.prod());
   }
-  std::printf("  %d of %d in none of the five cases; worst difference %.2g of the window\n", in_no_case, kCount, worst);
+  std::printf("  %d of %d in none of the five cases; worst difference %.2g of the window\n",
+              in_no_case, kCount, worst);
   EXPECT_GT(in_no_case, 500);
   EXPECT_LT(worst, 1e-10);
 }
@@ -222,12 +233,15 @@ TEST(WovenSegmentLaw, PartsOfTheWindowAddUp) {
   for (int n = 0; n < 2000; ++n) {
     const WovenSegment segment = random_segment(random);
     const Vec2d half = random_half(random);
-    const Vec2d middle = segment.size.cwiseProduct(Vec2d(random.uniform_double(), random.uniform_double()));
-    const double parts = highlight_area(segment, half, {Vec2d::Zero(), middle}) +
-                         highlight_area(segment, half, {middle, segment.size}) +
-                         highlight_area(segment, half, {{0, middle.y()}, {middle.x(), segment.size.y()}}) +
-                         highlight_area(segment, half, {{middle.x(), 0}, {segment.size.x(), middle.y()}});
-    EXPECT_NEAR(parts, highlight_area(segment, half, {Vec2d::Zero(), segment.size}), 1e-12 * segment.size.prod());
+    const Vec2d middle =
+        segment.size.cwiseProduct(Vec2d(random.uniform_double(), random.uniform_double()));
+    const double parts =
+        highlight_area(segment, half, {Vec2d::Zero(), middle}) +
+        highlight_area(segment, half, {middle, segment.size}) +
+        highlight_area(segment, half, {{0, middle.y()}, {middle.x(), segment.size.y()}}) +
+        highlight_area(segment, half, {{middle.x(), 0}, {segment.size.x(), middle.y()}});
+    EXPECT_NEAR(parts, highlight_area(segment, half, {Vec2d::Zero(), segment.size}),
+                1e-12 * segment.size.prod());
   }
 }
 
@@ -240,7 +254,9 @@ TEST(WovenSegment, DegenerateEllipsesAndWindows) {
   segment.semimajor = 0.0;
   EXPECT_EQ(highlight_share(segment, {0, 0}), 0.0);
   segment.semimajor = 1e-8;  // fits: its own area
-  EXPECT_NEAR(highlight_area(segment, {0, 0}, window) / (kPi * segment.semimajor * segment.semiminor()), 1.0, 1e-12);
+  EXPECT_NEAR(
+      highlight_area(segment, {0, 0}, window) / (kPi * segment.semimajor * segment.semiminor()),
+      1.0, 1e-12);
   segment.semimajor = 1e200;
   EXPECT_NEAR(highlight_share(segment, {0, 0}), 1.0, 1e-12);
   segment.semimajor = 1e6;  // its edge cuts the window
@@ -277,7 +293,8 @@ TEST(WovenSegment, FresnelAtKnownAngles) {
   EXPECT_NEAR(fresnel_dielectric(0.0, 1.5), 1.0, 1e-15);
   EXPECT_NEAR(fresnel_dielectric(0.3, 1.0), 0.0, 1e-15);
   // At Brewster's angle only the s part is left: ((n^2 - 1) / (n^2 + 1))^2 / 2.
-  EXPECT_NEAR(fresnel_dielectric(std::cos(std::atan(1.5)), 1.5), 0.5 * std::pow(1.25 / 3.25, 2), 1e-15);
+  EXPECT_NEAR(fresnel_dielectric(std::cos(std::atan(1.5)), 1.5), 0.5 * std::pow(1.25 / 3.25, 2),
+              1e-15);
 }
 
 TEST(WovenSegmentLaw, ReflectanceIsReciprocalAndThePrintedQuotient) {
@@ -290,16 +307,19 @@ TEST(WovenSegmentLaw, ReflectanceIsReciprocalAndThePrintedQuotient) {
     const Vec3d wi = direction();
     const Vec3d wo = direction();
     const Vec3d h = (wi + wo).normalized();
-    const double g = std::min({1.0, 2.0 * h.z() * wo.z() / wo.dot(h), 2.0 * h.z() * wi.z() / wo.dot(h)});
-    const double printed = fresnel_dielectric(std::min(1.0, wo.dot(h)), 1.5) * g / (wi.z() * wo.z());
+    const double g =
+        std::min({1.0, 2.0 * h.z() * wo.z() / wo.dot(h), 2.0 * h.z() * wi.z() / wo.dot(h)});
+    const double printed =
+        fresnel_dielectric(std::min(1.0, wo.dot(h)), 1.5) * g / (wi.z() * wo.z());
     EXPECT_NEAR(highlight_reflectance(wi, wo, 1.5) / wi.z() / printed, 1.0, 1e-9);
     EXPECT_NEAR(highlight_reflectance(wo, wi, 1.5) / wo.z() / printed, 1.0, 1e-9);
   }
 }
 
 TEST(WovenSegmentLaw, DirectionalAlbedoOfTheTwill) {
-  // Of the highlights alone, over k_s; warp to weft 6 : 2. Figures of an independent prototype, given to two digits for an
-  // azimuth that is not stated: ours over the azimuths must contain them, rounding allowed.
+  // Of the highlights alone, over k_s; warp to weft 6 : 2. Figures of an independent prototype,
+  // given to two digits for an azimuth that is not stated: ours over the azimuths must contain
+  // them, rounding allowed.
   const struct {
     double angle_deg;
     double albedo;
@@ -319,9 +339,11 @@ TEST(WovenSegmentLaw, DirectionalAlbedoOfTheTwill) {
         const double theta = 0.5 * kPi * (i + 0.5) / kRows;
         for (int j = 0; j < kColumns; ++j) {
           const double phi = 2.0 * kPi * (j + 0.5) / kColumns;
-          const Vec3d wi(std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta));
+          const Vec3d wi(std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi),
+                         std::cos(theta));
           const Vec2d half = half_vector(wi, wo);
-          const double share = 0.75 * highlight_share(twill_warp(), half) + 0.25 * highlight_share(twill_weft(), half);
+          const double share = 0.75 * highlight_share(twill_warp(), half) +
+                               0.25 * highlight_share(twill_weft(), half);
           sum += share * highlight_reflectance(wi, wo, 1.5) * std::sin(theta);
         }
       }

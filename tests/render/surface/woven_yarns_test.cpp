@@ -44,9 +44,10 @@ TEST(WovenYarnsLaw, SpineSpansItsSegment) {
     for (const double umax_deg : {5.0, 30.0, 45.0, 80.0}) {
       const YarnSegment segment = {material(0, umax_deg, kappa), 1, 3};
       const double u_max = radians(umax_deg);
-      const QuadratureRule rule =
-          gauss_legendre_panels(20, 0.0, u_max, {0.5 * u_max, 0.9 * u_max, 0.97 * u_max, 0.99 * u_max});
-      const double span = integrate(rule, [&](double u) { return spine_radius(segment, u, u_max) * std::cos(u); });
+      const QuadratureRule rule = gauss_legendre_panels(
+          20, 0.0, u_max, {0.5 * u_max, 0.9 * u_max, 0.97 * u_max, 0.99 * u_max});
+      const double span =
+          integrate(rule, [&](double u) { return spine_radius(segment, u, u_max) * std::cos(u); });
       EXPECT_NEAR(span, 0.5 * (3.0 - std::sin(u_max)), 1e-6) << kappa << " " << umax_deg;
     }
   }
@@ -58,7 +59,8 @@ TEST(WovenYarns, SpineIsTheConicThatKappaNames) {
   const YarnSegment circle = {material(0, 45, 0), 1, 3};
   EXPECT_NEAR(spine_radius(circle, 0.0, u_max), reach / std::sin(u_max), 1e-12);
   EXPECT_NEAR(spine_radius(circle, 0.7, u_max), reach / std::sin(u_max), 1e-12);
-  // kappa = -1/2 at 45 degrees: the parabola z = -y^2 / (2 p), slope y / p, so p = reach and R = p / cos^3.
+  // kappa = -1/2 at 45 degrees: the parabola z = -y^2 / (2 p), slope y / p, so p = reach and R = p
+  // / cos^3.
   const YarnSegment parabola = {material(0, 45, -0.5), 1, 3};
   EXPECT_NEAR(spine_radius(parabola, 0.3, u_max), reach / std::pow(std::cos(0.3), 3), 1e-12);
   // kappa = 1/2: an ellipse of ratio 2, y = b sin t, z = b/2 cos t, tan t = 2 tan u.
@@ -66,24 +68,28 @@ TEST(WovenYarns, SpineIsTheConicThatKappaNames) {
   const double b = reach / std::sin(std::atan(2.0));
   const double t = std::atan(2.0 * std::tan(0.3));
   EXPECT_NEAR(spine_radius(ellipse, 0.3, u_max),
-              std::pow(std::pow(b * std::cos(t), 2) + std::pow(0.5 * b * std::sin(t), 2), 1.5) / (0.5 * b * b), 1e-12);
+              std::pow(std::pow(b * std::cos(t), 2) + std::pow(0.5 * b * std::sin(t), 2), 1.5) /
+                  (0.5 * b * b),
+              1e-12);
   // kappa = -3/4: a hyperbola, y = b sinh t, z = -2 b cosh t, tanh t = tan u / 2.
   const YarnSegment hyperbola = {material(0, 45, -0.75), 1, 3};
   const double bh = reach / std::sinh(std::atanh(0.5));
   const double th = std::atanh(0.5 * std::tan(0.3));
-  EXPECT_NEAR(spine_radius(hyperbola, 0.3, u_max),
-              std::pow(std::pow(bh * std::cosh(th), 2) + std::pow(2.0 * bh * std::sinh(th), 2), 1.5) / (2.0 * bh * bh),
-              1e-12);
+  EXPECT_NEAR(
+      spine_radius(hyperbola, 0.3, u_max),
+      std::pow(std::pow(bh * std::cosh(th), 2) + std::pow(2.0 * bh * std::sinh(th), 2), 1.5) /
+          (2.0 * bh * bh),
+      1e-12);
 }
 
-/// Integral over the tube of (fiber tangent . (wi + wo) within a narrow Gaussian) * area element * phase * attenuation: the
-/// model before its delta function is resolved.
+/// Integral over the tube of (fiber tangent . (wi + wo) within a narrow Gaussian) * area element *
+/// phase * attenuation: the model before its delta function is resolved.
 double tube_integral(const YarnSegment& segment, const Vec3d& wi, const Vec3d& wo, int steps) {
   const YarnMaterial& yarn = segment.material;
   const Vec3d sum = wi + wo;
   const double a = 0.5 * segment.width;
-  const double phase =
-      yarn.uniform + std::exp(-yarn.forward * (wi.dot(wo) + 1.0)) / (2.0 * kPi * scaled_bessel_i0(yarn.forward));
+  const double phase = yarn.uniform + std::exp(-yarn.forward * (wi.dot(wo) + 1.0)) /
+                                          (2.0 * kPi * scaled_bessel_i0(yarn.forward));
   constexpr double kDeviation = 0.01;
   double total = 0.0;
   for (int i = 0; i < steps; ++i) {
@@ -101,7 +107,8 @@ double tube_integral(const YarnSegment& segment, const Vec3d& wi, const Vec3d& w
       const double cos_i = n.dot(wi);
       const double cos_o = n.dot(wo);
       if (cos_i <= 0.0 || cos_o <= 0.0) continue;
-      total += std::exp(-0.5 * x * x) * a * (radius + a * std::cos(v)) * cos_i * cos_o / (cos_i + cos_o);
+      total +=
+          std::exp(-0.5 * x * x) * a * (radius + a * std::cos(v)) * cos_i * cos_o / (cos_i + cos_o);
     }
   }
   const double cell = 2.0 * yarn.max_inclination / steps * kPi / steps;
@@ -121,15 +128,19 @@ TEST(WovenYarnsAgreement, MeanOfASegmentIsTheIntegralOverItsTube) {
       const Vec3d wo = random_direction(random, 0.3);
       // Keep off the ends of the spine, where the Gaussian of the oracle is cut in half.
       const double u = std::atan2((wi + wo).y(), (wi + wo).z());
-      if (segment.material.twist == 0.0 && std::abs(std::abs(u) - segment.material.max_inclination) < 0.06) continue;
-      const double value = yarn_highlight_integral(segment, {-half, half}, wi, wo) / (segment.width * segment.length);
+      if (segment.material.twist == 0.0 &&
+          std::abs(std::abs(u) - segment.material.max_inclination) < 0.06)
+        continue;
+      const double value = yarn_highlight_integral(segment, {-half, half}, wi, wo) /
+                           (segment.width * segment.length);
       const double expected = tube_integral(segment, wi, wo, 900);
       largest = std::max(largest, expected);
       worst = std::max(worst, std::abs(value - expected));
       compared += expected > 0.0 ? 1 : 0;
     }
     std::printf("  psi %g: worst %.2g of %.3g\n", degrees(segment.material.twist), worst, largest);
-    // The oracle's Gaussian blurs where the curve leaves the tube: first order in its deviation, 0.01.
+    // The oracle's Gaussian blurs where the curve leaves the tube: first order in its deviation,
+    // 0.01.
     EXPECT_LT(worst, 0.01 * largest);
   }
   EXPECT_GT(compared, 25);
@@ -151,7 +162,8 @@ TEST(WovenYarnsLaw, IntegralIsThatOfThePoints) {
       for (int i = 0; i < kGrid; ++i) {
         for (int j = 0; j < kGrid; ++j) {
           const Vec2d cell((i + 0.5) / kGrid, (j + 0.5) / kGrid);
-          sum += yarn_highlight(segment, part.min + (part.max - part.min).cwiseProduct(cell), wi, wo);
+          sum +=
+              yarn_highlight(segment, part.min + (part.max - part.min).cwiseProduct(cell), wi, wo);
         }
       }
       const double mean = sum / (kGrid * kGrid);
@@ -161,7 +173,8 @@ TEST(WovenYarnsLaw, IntegralIsThatOfThePoints) {
     }
     std::printf("  psi %g, u_max %g: worst %.2g of %.3g\n", degrees(segment.material.twist),
                 degrees(segment.material.max_inclination), worst, largest);
-    // The band's edges are steps: one row of the grid in 300, of a band that fills half of the segment.
+    // The band's edges are steps: one row of the grid in 300, of a band that fills half of the
+    // segment.
     EXPECT_GT(largest, 0.0);
     EXPECT_LT(worst, 2.0 / 300.0 * largest);
   }
@@ -196,12 +209,14 @@ TEST(WovenYarnsLaw, WeftIsWarpTurned) {
     const Vec2 at(random.uniform(), random.uniform());
     const float footprint = n % 3 == 0 ? 0.0F : n % 3 == 1 ? 0.2F : 100.0F;
     const double value = model.reflected({at, footprint}, wi, wo)[0];
-    const double other = model.reflected({Vec2(-at.y(), at.x()), footprint}, turned(wi), turned(wo))[0];
+    const double other =
+        model.reflected({Vec2(-at.y(), at.x()), footprint}, turned(wi), turned(wo))[0];
     differ += std::abs(other - value) > 1e-5 * value ? 1 : 0;
     lit += value > 0.0 ? 1 : 0;
   }
   EXPECT_GT(lit, 500);
-  // Rounding may move a step of the integrand over a node of its quadrature, or a point over the band's edge.
+  // Rounding may move a step of the integrand over a node of its quadrature, or a point over the
+  // band's edge.
   EXPECT_LT(differ, 5);
 }
 
@@ -213,7 +228,8 @@ TEST(WovenYarns, PublicPresetsHaveTheirPublishedAreas) {
   const double weft[] = {1, 16, 1, 2, 6, 1};
   for (std::size_t i = 0; i < std::size(kPublicPresets); ++i) {
     const WovenYarnsParameters parameters = read_woven_yarns(surface_preset(kPublicPresets[i]));
-    EXPECT_NEAR(parameters.pattern.coverage(YarnSystem::kWarp), warp[i] / (warp[i] + weft[i]), 1e-12)
+    EXPECT_NEAR(parameters.pattern.coverage(YarnSystem::kWarp), warp[i] / (warp[i] + weft[i]),
+                1e-12)
         << kPublicPresets[i];
   }
   const WovenYarnsParameters charmeuse = read_woven_yarns(surface_preset("irawan-charmeuse"));
@@ -238,10 +254,12 @@ TEST(WovenYarnsLaw, FarIsTheMeanOfNearAndOfEveryFootprint) {
       for (int i = 0; i < grid; ++i) {
         for (int j = 0; j < grid; ++j) {
           const Vec2d at = repeat.cwiseProduct(Vec2d((i + 0.5) / grid, (j + 0.5) / grid));
-          sum += model.reflected({at.cast<float>(), static_cast<float>(footprint * repeat.maxCoeff())}, wi, wo);
+          sum += model.reflected(
+              {at.cast<float>(), static_cast<float>(footprint * repeat.maxCoeff())}, wi, wo);
         }
       }
-      EXPECT_LT((sum / (far * grid * grid) - 1.0).abs().maxCoeff(), 0.01) << name << " " << footprint;
+      EXPECT_LT((sum / (far * grid * grid) - 1.0).abs().maxCoeff(), 0.01)
+          << name << " " << footprint;
     }
   }
 }
@@ -292,10 +310,12 @@ TEST(WovenYarnsStatistical, SamplesFollowTheDensityAndWeighWhatTheyShould) {
             albedo.add(drawn ? drawn->weight[0] : 0.0);
             return drawn ? drawn->wi.cast<double>() : Vec3d(0, 0, -1);
           },
-          [&](const Vec3d& wi) -> double { return model.pdf(point, wi.cast<float>(), wo); }, 300000, kTests,
-          {.phi_min = 0.0, .phi_max = kPi}));
-      const double exact = 4.0 * kPi * model.reflected_sg(point, Vec3d::UnitZ(), 0.0, wo.cast<double>())[0];
-      EXPECT_TRUE(means_agree("albedo", albedo.mean(), albedo.standard_error(), exact, 0.01 * exact, kTests));
+          [&](const Vec3d& wi) -> double { return model.pdf(point, wi.cast<float>(), wo); }, 300000,
+          kTests, {.phi_min = 0.0, .phi_max = kPi}));
+      const double exact =
+          4.0 * kPi * model.reflected_sg(point, Vec3d::UnitZ(), 0.0, wo.cast<double>())[0];
+      EXPECT_TRUE(means_agree("albedo", albedo.mean(), albedo.standard_error(), exact, 0.01 * exact,
+                              kTests));
     }
   }
 }
@@ -326,7 +346,8 @@ TEST(WovenYarnsStatistical, SpecularAlbedoIsWhatThePresetSays) {
 
 TEST(WovenYarns, FilamentsFadeOutBySmoothStep) {
   const YarnSegment segment = {material(0, 40, 0.5, 0.4), 1, 3};
-  // Light and view along one direction at inclination u: all factors but the fading are the same past (1 - 0.4) u_max.
+  // Light and view along one direction at inclination u: all factors but the fading are the same
+  // past (1 - 0.4) u_max.
   const auto value_at = [&](double share_of_fade) {
     const double u = radians(40) * (0.6 + 0.4 * share_of_fade);
     const Vec3d w(0, std::sin(u), std::cos(u));
@@ -342,7 +363,8 @@ TEST(WovenYarns, FilamentsFadeOutBySmoothStep) {
 
 TEST(WovenYarns, SegmentsTooShortForTheirInclinationHaveNoHighlight) {
   const Vec3d w = Vec3d(0.1, 0.1, 1).normalized();
-  YarnSegment segment = {material(0, 36, 0), 2, 1};  // the weft of the public twill: 2 sin 36 degrees > 1
+  // the weft of the public twill: 2 sin 36 degrees > 1
+  YarnSegment segment = {material(0, 36, 0), 2, 1};
   EXPECT_EQ(yarn_highlight_integral(segment, {{-1, -0.5}, {1, 0.5}}, w, w), 0.0);
   EXPECT_EQ(yarn_highlight(segment, {0, 0}, w, w), 0.0);
   segment.length = 1.2;
@@ -355,9 +377,11 @@ TEST(WovenYarns, ConfigErrorsHaveTheirPlace) {
       "model = \"irawan-2012\"\nunit_mm = 1\n[weave]\nnotation = \"plain\"\nend_widths = [1]\n"
       "pick_widths = [1]\n";
   const std::string yarn =
-      "diffuse = [0, 0, 0]\nspecular = [1, 1, 1]\nalpha = 0\nbeta = 10\npsi_deg = 0\numax_deg = 90\nkappa = -0.99\n";
+      "diffuse = [0, 0, 0]\nspecular = [1, 1, 1]\nalpha = 0\nbeta = 10\npsi_deg = 0\numax_deg = "
+      "90\nkappa = -0.99\n";
   try {
-    read_surface_model(TomlTable::parse(text + "[warp]\n" + yarn + "[weft]\n" + yarn, "velvet.toml"));
+    read_surface_model(
+        TomlTable::parse(text + "[warp]\n" + yarn + "[weft]\n" + yarn, "velvet.toml"));
     FAIL() << "accepted";
   } catch (const ConfigError& error) {
     EXPECT_NE(std::string(error.what()).find("velvet.toml:13:"), std::string::npos) << error.what();
