@@ -121,8 +121,8 @@ TEST(ConfigDocumentation, NamesEveryKeyOfASurfaceFabric) {
   }
 }
 
-TEST(ConfigDocumentation, TheReadmeNamesEverySurfaceFabric) {
-  std::ifstream stream(fs::path(HEDDLE_SOURCE_DIR) / "README.md");
+TEST(ConfigDocumentation, ThePageOfSurfaceModelsNamesEverySurfaceFabric) {
+  std::ifstream stream(fs::path(HEDDLE_SOURCE_DIR) / "docs/surface-models.md");
   std::stringstream text;
   text << stream.rdbuf();
   for (const std::string& name : surface_preset_names()) {

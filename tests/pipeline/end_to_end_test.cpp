@@ -218,8 +218,8 @@ TEST(PackEndToEnd, DamagedPacksAreRefused) {
 TEST(PackEndToEnd, NumpyAloneOpensAPack) {
   const Workshop shop;
   ASSERT_EQ(shop.run({"synth", "fabric.toml"}).status, 0);
-  // The snippet of the README, as it stands there.
-  const std::string readme = text_of(fs::path(HEDDLE_SOURCE_DIR) / "README.md");
+  // The snippet of fibers/README.md, as it stands there.
+  const std::string readme = text_of(fs::path(HEDDLE_SOURCE_DIR) / "fibers/README.md");
   const std::string fence = "```python\n";
   const std::size_t begin = readme.find(fence);
   ASSERT_NE(begin, std::string::npos);
