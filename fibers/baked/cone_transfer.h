@@ -1,24 +1,29 @@
 #ifndef HEDDLE_FIBERS_BAKED_CONE_TRANSFER_H_
 #define HEDDLE_FIBERS_BAKED_CONE_TRANSFER_H_
 // The part of a cell's transfer that spherical harmonics blur: light that parallel fibers keep on a
-// cone.
+// cone. Not in the papers.
 //
-// A smooth fiber conserves light's inclination to its tangent, up to the width beta of its lobe.
-// Among parallel filaments indirect light therefore arrives within a few degrees of the cone on
-// which the light itself lies about the bundle (bundle_tangents.h), and harmonics of order 5, which
-// resolve some 30 degrees, spread it: 26 % RMSE on flat silk satin. Paths are sorted by the
-// deviation that their history predicts: the variances of the lobes that scattered them, and sin^2
-// of the angle between each fiber and the bundle. (Within a class the measured deviations have that
-// variance, and are Gaussian: kurtosis 2.1 to 3.1 on silk, cotton and wool.) For those below a
-// limit the transfer is modelled as
+// A smooth fiber conserves the light's inclination to its tangent, up to the width beta of its
+// lobe. Among parallel filaments, indirect light therefore stays near a cone about the bundle
+// (bundle_tangents.h): that on which the light itself lies, within a few degrees. Harmonics of
+// order 5 resolve some 30 degrees and spread it: 26 % RMSE on flat silk satin.
+//
+// The history of a path predicts its deviation from the cone: the variances of the lobes that
+// scattered it, and sin^2 of the angle between each fiber and the bundle. Paths are sorted into
+// classes by it. Within a class the measured deviations have that variance and are Gaussian
+// (kurtosis 2.1 to 3.1 on silk, cotton and wool). For paths below a limit the transfer is modelled
+// as
 //
 //   T(w0, w) = sum over widths d: N(theta - theta0; deviation_d) / cos(theta) * f_d(w0, phi)
 //
-// theta and theta0 the inclinations of w and w0 to the segment's bundle, phi the azimuth of w about
-// it, f_d smooth: real spherical harmonics in w0 (fabric space), Fourier series in phi. f_d's
-// coefficients are moments of the same paths that make the matrix: moments[d][j0][m] = mean of 4 pi
-// throughput Y_j0(w0) F_m(phi), so that no light is lost or gained. Not in the papers. Tested in
-// tests/precompute/transfer_bake_test.cpp and tests/render/multiple_scattering_test.cpp.
+// theta and theta0 are the inclinations of w and w0 to the segment's bundle. phi is the azimuth of
+// w about it. f_d is smooth: real spherical harmonics in w0 (fabric space), Fourier series in phi.
+// Its coefficients are moments of the same paths that make the matrix, so no light is lost or
+// gained:
+//
+//   moments[d][j0][m] = mean of 4 pi throughput Y_j0(w0) F_m(phi)
+//
+// Tested in tests/precompute/transfer_bake_test.cpp and tests/render/multiple_scattering_test.cpp.
 
 #include <array>
 #include <cstdint>

@@ -1,10 +1,12 @@
 #ifndef HEDDLE_FIBERS_BAKED_FABRIC_PACK_H_
 #define HEDDLE_FIBERS_BAKED_FABRIC_PACK_H_
-// A pack: one folder that holds everything a renderer needs of one fabric, and a manifest.json with
-// the size and the XXH3-128 of every other file (and of itself). Files: fibers.safetensors always;
-// ssdf.safetensors, sg.safetensors, transfer.safetensors and volume.vdb where the pack was made
-// with them. Checks, in this order, before any file but the manifest is opened; the first that
-// fails is the message:
+// A pack is one folder with everything that a renderer needs of one fabric. Its manifest.json holds
+// the size and the XXH3-128 of every other file, and a checksum of itself. fibers.safetensors is
+// always there. ssdf.safetensors, sg.safetensors, transfer.safetensors and volume.vdb are there if
+// the pack was made with them.
+//
+// Before any file but the manifest is opened, these are checked in order. The first that fails is
+// the message:
 //   1. manifest.json is JSON in the layout of this version and its own checksum holds;
 //   2. every file name is a plain name of a file this version knows;
 //   3. every file exists and has the size stated;

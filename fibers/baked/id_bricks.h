@@ -1,11 +1,13 @@
 #ifndef HEDDLE_FIBERS_BAKED_ID_BRICKS_H_
 #define HEDDLE_FIBERS_BAKED_ID_BRICKS_H_
-// The segment-id volume of one tile as 8^3 bricks, marched by a ray through endless copies of the
-// tile; empty bricks are skipped in one step. Fabric space, millimetres. The volume is sampled once
-// per slice of voxels, across the axis along which the ray passes the most of them, where the ray
-// meets the slice's middle (Khungurn 2017, section 5.1, samples at equal distances). Taking every
-// voxel that the ray touches makes fibers look thicker the more obliquely they are seen: single
-// scattering of cotton came out 5 % too bright. Tested in tests/fibers/baked/id_bricks_test.cpp.
+// The segment-id volume of one tile as 8^3 bricks. A ray marches through endless copies of the tile
+// and skips an empty brick in one step. Fabric space, millimetres.
+//
+// The ray passes most voxels along one axis. The volume is sampled once per slice of voxels across
+// that axis, where the ray meets the middle of the slice (Khungurn 2017, section 5.1, samples at
+// equal distances). If every voxel that the ray touches counted, fibers would look thicker the more
+// obliquely they are seen: single scattering of cotton came out 5 % too bright. Tested in
+// tests/fibers/baked/id_bricks_test.cpp.
 
 #include <array>
 #include <cstdint>

@@ -1,8 +1,8 @@
 #ifndef HEDDLE_FIBERS_BAKED_SEGMENT_VISIBILITY_H_
 #define HEDDLE_FIBERS_BAKED_SEGMENT_VISIBILITY_H_
-// Run-time form of segment visibility (Khungurn 2017, section 4.1): the spherical signed distance
-// function compressed by PCA, for sharp lights, and a sum of normalised spherical Gaussians, for
-// soft lights. Fabric space. Tested in tests/fibers/baked/segment_visibility_test.cpp.
+// Run-time form of segment visibility (Khungurn 2017, section 4.1), in fabric space. Sharp lights
+// use the spherical signed distance function, compressed by PCA. Soft lights use a sum of
+// normalised spherical Gaussians. Tested in tests/fibers/baked/segment_visibility_test.cpp.
 
 #include <cstdint>
 #include <filesystem>

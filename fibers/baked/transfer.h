@@ -1,9 +1,12 @@
 #ifndef HEDDLE_FIBERS_BAKED_TRANSFER_H_
 #define HEDDLE_FIBERS_BAKED_TRANSFER_H_
-// Run-time form of the incoming indirect radiance transfer function (IIRTF): per cell a matrix of
-// real spherical harmonics coefficients, c_T[j1] = sum over j0 of a[j0][j1] * c_light[j0], j0 the
-// light and j1 the incoming direction, fabric space (Khungurn 2017, sections 4.2 and 5.3; index
-// order corrected as in design section 3). Tested in tests/fibers/baked/transfer_test.cpp.
+// Run-time form of the incoming indirect radiance transfer function (IIRTF). Each cell has a matrix
+// of real spherical harmonics coefficients:
+//
+//   c_T[j1] = sum over j0 of a[j0][j1] * c_light[j0],   j0 the light, j1 the incoming direction
+//
+// Fabric space (Khungurn 2017, sections 4.2 and 5.3, with the order of the indices corrected).
+// Tested in tests/fibers/baked/transfer_test.cpp.
 
 #include <cstdint>
 #include <filesystem>

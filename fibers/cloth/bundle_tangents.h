@@ -1,9 +1,9 @@
 #ifndef HEDDLE_FIBERS_CLOTH_BUNDLE_TANGENTS_H_
 #define HEDDLE_FIBERS_CLOTH_BUNDLE_TANGENTS_H_
-// The direction in which the fibers about a segment run together: the axis of the cone on which
-// light stays while they scatter it. A fiber conserves light's inclination to its own tangent; in a
-// bundle, wander averages out, and what is conserved best is the inclination to the bundle's mean.
-// Tested in tests/fibers/cloth/bundle_tangents_test.cpp.
+// The direction in which the fibers about a segment run together. It is the axis of the cone on
+// which light stays while they scatter it. A fiber conserves the light's inclination to its own
+// tangent. In a bundle, wander averages out, and the inclination to the bundle's mean is conserved
+// best. Tested in tests/fibers/cloth/bundle_tangents_test.cpp.
 
 #include <span>
 #include <vector>

@@ -1,10 +1,11 @@
 #ifndef HEDDLE_FIBERS_CLOTH_EXEMPLAR_H_
 #define HEDDLE_FIBERS_CLOTH_EXEMPLAR_H_
-// The exemplar: explicit fibers of one fabric tile, periodic in x (weft direction) and y (warp
-// direction), millimetres, z = 0 the middle plane, +z out of the face. A fiber is a polyline of
-// straight round segments whose last point is its first point shifted by one period along its yarn,
-// so that the curve goes on through every copy of the tile under one id. Invariants, checked by
-// validate_exemplar():
+// The exemplar: explicit fibers of one fabric tile, in millimetres. The tile is periodic in x (weft
+// direction) and y (warp direction). z = 0 is the middle plane, and +z points out of the face.
+//
+// A fiber is a polyline of straight round segments. Its last point is its first point shifted by
+// one period along its yarn, so the curve goes on through every copy of the tile under one id.
+// Invariants, checked by validate_exemplar():
 //   1. first_point is ascending, starts at 0, ends at points.size(), and every fiber has at least 2
 //      segments;
 //   2. the tile is at most 10 m wide and high; points lie within one tile around it and 1 m of its

@@ -12,9 +12,9 @@ namespace {
 
 constexpr double kTurn = 2 * kPi;
 
-// Wander is a sum of this many Fourier modes per axis, with wavelengths between kShortestWave and
-// kLongestWave fiber radii: long against the fiber's thickness, short enough that even 10 degrees
-// stay within the yarn.
+// Wander is a sum of this many Fourier modes per axis. Their wavelengths lie between kShortestWave
+// and kLongestWave fiber radii. That is long against the fiber's thickness, and short enough that
+// even 10 degrees stay within the yarn.
 constexpr int kWanderModes = 4;
 constexpr double kShortestWave = 25;
 constexpr double kLongestWave = 80;
@@ -22,10 +22,10 @@ constexpr double kLongestWave = 80;
 // A fiber's place in its ply is jittered by this share of the spacing of the sunflower pattern.
 constexpr double kPlaceJitter = 0.25;
 
-// Points per turn of the tightest helix that a polyline needs to look round.
+// Points per turn of the tightest helix. A polyline with fewer does not look round.
 constexpr double kPointsPerTurn = 14;
 
-// Ply cross-sections: circles that touch each other and the yarn's edge; two plies are stretched
+// Ply cross-sections are circles that touch each other and the yarn's edge. Two plies are stretched
 // across the line of their centres as far as the yarn's disc allows (semi-axis sqrt(1/2)).
 struct PlyShape {
   double centre;      // distance of the ply's axis from the yarn's axis

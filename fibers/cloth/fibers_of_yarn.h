@@ -1,11 +1,11 @@
 #ifndef HEDDLE_FIBERS_CLOTH_FIBERS_OF_YARN_H_
 #define HEDDLE_FIBERS_CLOTH_FIBERS_OF_YARN_H_
-// Fibers of one yarn, after the procedural yarn model of Zhao, Luan, Bala 2016 (plies twisted about
-// the yarn, fibers twisted about their ply, radial migration), with a band-limited random wander of
-// stated rms angle added. The yarn's cross-section is a unit disc, scaled to the flattened ellipse
-// of the yarn less one fiber radius, so no fiber leaves its yarn. Twists are snapped to whole turns
-// per tile, which makes every fiber periodic under its own id. Everything random comes from (seed,
-// yarn, fiber). Tested in tests/fibers/cloth/fibers_of_yarn_test.cpp.
+// Fibers of one yarn, after the procedural yarn model of Zhao, Luan, Bala 2016: plies twisted about
+// the yarn, fibers twisted about their ply, radial migration. A band-limited random wander of
+// stated rms angle is added. The yarn's cross-section is a unit disc. It is scaled to the flattened
+// ellipse of the yarn less one fiber radius, so no fiber leaves its yarn. Twists are snapped to
+// whole turns per tile, which makes every fiber periodic under its own id. Everything random comes
+// from (seed, yarn, fiber). Tested in tests/fibers/cloth/fibers_of_yarn_test.cpp.
 
 #include <cstdint>
 

@@ -30,7 +30,7 @@ struct Weave {
 };
 
 /// Parses a notation. twill n/m: n up, m down, step 1. satin n/step: warp-faced (one weft float of
-/// n - 1 hidden) or weft-faced; n >= 5, 2 <= step <= n - 2, n and step coprime. Throws
+/// n - 1 hidden) or weft-faced. It needs n >= 5, 2 <= step <= n - 2, and n and step coprime. Throws
 /// std::invalid_argument saying what was expected.
 Weave parse_weave(std::string_view notation, WeaveFace face);
 

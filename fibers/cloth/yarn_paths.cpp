@@ -24,8 +24,8 @@ double section(double distance, double half_width) {
   return std::sqrt(std::max(0.0, 1 - u * u));
 }
 
-// What decides the heights at a crossing: which yarn lies over there and at the four crossings
-// beside it, as yarns are at most as wide as their spacing.
+// The heights at a crossing depend on which yarn lies over there and at the four crossings beside
+// it. Yarns are at most as wide as their spacing, so nothing else can matter.
 unsigned kind_of_crossing(const Weave& weave, int end, int pick) {
   const auto bit = [&](int e, int p, unsigned value) {
     return weave.is_warp_up(e, p) ? value : 0U;

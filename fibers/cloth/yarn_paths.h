@@ -1,11 +1,11 @@
 #ifndef HEDDLE_FIBERS_CLOTH_YARN_PATHS_H_
 #define HEDDLE_FIBERS_CLOTH_YARN_PATHS_H_
-// Crimped centre lines of the yarns of one tile. Each yarn runs straight in the plane and rises
-// over and dives under the yarns that it crosses: crests at the crossings, cosine flanks between
-// them, flat floats. A yarn's cross-section in the vertical plane is an ellipse (width x height).
-// The crest heights are the smallest for which no two yarns overlap anywhere, found from the
-// clearance of every kind of crossing on a grid; warp and weft share them by `crimp_warp`. Tested
-// in tests/fibers/cloth/yarn_paths_test.cpp.
+// Crimped centre lines of the yarns of one tile. In the plane each yarn runs straight. It rises
+// over and dives under the yarns that it crosses, with crests at the crossings, cosine flanks
+// between them and flat floats. A yarn's cross-section in the vertical plane is an ellipse (width x
+// height). The crest heights are the smallest for which no two yarns overlap anywhere. They follow
+// from the clearance of every kind of crossing on a grid. Warp and weft share them by `crimp_warp`.
+// Tested in tests/fibers/cloth/yarn_paths_test.cpp.
 
 #include <vector>
 

@@ -4,16 +4,20 @@
 // response to spherical Gaussians and to spherical harmonics. Tables sample the double-precision
 // functions of fiber_bcsdf.h and sg_scatter.h.
 //
-// Fiber frame: x = tangent; all directions point away from the fiber; values are 1/sr without the
-// cosine, densities 1/sr over the whole sphere. Sampling draws wi for a given wo: a lobe by the
-// tabulated adjoint albedos (the integrals of S_R and S_TT cos(theta_i) over wi), then theta_i from
-// the lobe's Gaussian cut to [-pi/2, pi/2] and the azimuth exactly. The density is that of the
-// mixture. Albedos are weighed by `importance`, the throughput of the path so far: then the sum of
-// the throughput's colours stays almost what it was. With colours weighed alike whatever the path
-// carries, weights of a white fiber's 30 bounces vary as the product of 30 factors (throughputs in
-// the hundreds, most of the light in few paths). Worst change of that sum over the fibers and
-// angles tested: a factor of 2.6 (hundreds when Schlick's F at theta_o chooses the lobe). Building
-// one takes about 0.1 s. Tested, with the errors and the worst weights, in
+// Fiber frame: x = tangent. All directions point away from the fiber. Values are 1/sr without the
+// cosine, densities 1/sr over the whole sphere.
+//
+// Sampling draws wi for a given wo. First it draws a lobe by the tabulated adjoint albedos, which
+// are the integrals of S_R and S_TT cos(theta_i) over wi. Then it draws theta_i from the lobe's
+// Gaussian cut to [-pi/2, pi/2], and the azimuth exactly. The density is that of the mixture.
+//
+// Albedos are weighed by `importance`, the throughput of the path so far. The sum of the
+// throughput's colours then stays almost what it was. With all colours weighed alike, the weight
+// after a white fiber's 30 bounces varies as the product of 30 factors: throughputs reach hundreds,
+// and most of the light is in few paths. Worst change of that sum over the fibers and angles
+// tested: a factor of 2.6 (hundreds when Schlick's F at theta_o chooses the lobe).
+//
+// Building one takes about 0.1 s. Tested, with the errors and the worst weights, in
 // tests/fibers/scattering/bcsdf_table_test.cpp.
 
 #include <array>
@@ -50,9 +54,9 @@ class BcsdfTable {
   /// Gamma of sg_scatter.h by SgMethod::kDefault, for a unit axis and sharpness >= 0.
   Rgb sg_scatter(const Vec3& axis, float sharpness, const Vec3& wo) const;
 
-  /// One lobe's share of Gamma, and where that light comes from: about the direction that lies
-  /// `theta_shift` further in inclination and `turn` further in azimuth than the axis, a Gaussian
-  /// of the given precisions (1 / variance, radians^-2) in both.
+  /// One lobe's share of Gamma, and where that light comes from: a Gaussian of the given precisions
+  /// (1 / variance, radians^-2) in inclination and azimuth. Its mean lies `theta_shift` further in
+  /// inclination and `turn` further in azimuth than the axis.
   struct LobeResponse {
     Rgb value = Rgb::Zero();
     float theta_shift = 0;
@@ -66,10 +70,10 @@ class BcsdfTable {
 
   using Lanes = Eigen::Array<float, 8, 1>;
   using RgbLanes = Eigen::Array<float, 8, 3>;
-  /// Scattered towards inclination theta_o from light that is Gaussian in inclination: sum over the
-  /// lanes of light * integral of S cos(theta) N(theta; theta_i, variance) dtheta, theta_i per
-  /// lane, variance > 0, cos_turn the cosine of the lane's azimuth from wo's. The product of
-  /// Gaussians is exact, the factors beside it are taken at its mean.
+  /// Scattered towards inclination theta_o from light that is Gaussian in inclination: the sum over
+  /// the lanes of light * integral of S cos(theta) N(theta; theta_i, variance) dtheta. theta_i and
+  /// cos_turn, the cosine of the azimuth from wo's, are per lane. variance > 0. The product of
+  /// Gaussians is exact; the factors beside it are taken at its mean.
   Rgb blurred_scatter(const Lanes& theta_i, const Lanes& cos_turn, float theta_o, float variance,
                       const RgbLanes& light) const;
 

@@ -58,13 +58,11 @@ class LobeIntegrand {
     return -inverse_variance_ * (theta - cone_) - sharpness_ * std::sin(theta - light_theta_);
   }
 
-  // B without Schlick's factor; |theta| <= pi/2. The printed I0 and exp overflow: the scaled form
+  // B without Schlick's factor; |theta| <= pi/2. The printed I0 and exp overflow. The scaled form
   // is
-  //   exp(-k - A) times the integral over phi_i = 2 pi I0e(m) exp(-q / (m + A + k)), A = sharpness
-  //     cos(theta)
-  //   cos(theta'), m = sqrt(k^2 + A^2 - 2 k A cos(d)) = sqrt((k - A)^2 + k A |u' - u_o|^2), q = k A
-  //     |u' +
-  //   u_o|^2.
+  //   exp(-k - A) times the integral over phi_i = 2 pi I0e(m) exp(-q / (m + A + k))
+  //   A = sharpness cos(theta) cos(theta'),   q = k A |u' + u_o|^2
+  //   m = sqrt(k^2 + A^2 - 2 k A cos(d)) = sqrt((k - A)^2 + k A |u' - u_o|^2)
   double smooth(double theta) const {
     const double cosine = std::sin(kHalfPi - std::abs(theta));
     const double a = sharpness_ * light_cosine_ * cosine;
@@ -122,8 +120,8 @@ class LobeIntegrand {
   }
 
   void quadrature(LobeSums& sums) const {
-    // E falls from the cone to theta' on one side and from theta' to the cone on the other, so its
-    // maximum lies between: bisection on its slope.
+    // E's maximum lies between the cone and theta', since E falls outside them. Bisection on its
+    // slope.
     double low = std::min(cone_, light_theta_);
     double high = std::max(cone_, light_theta_);
     for (int step = 0; step < 60 && high > low; ++step) {

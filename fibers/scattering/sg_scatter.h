@@ -3,18 +3,18 @@
 // Gamma: what a fiber scatters to wo from a spherical Gaussian of light,
 //   Gamma = integral of G(wi; axis, sharpness) S(wi, wo) cos(theta_i) over wi,   G not normalised.
 //
-// The azimuth integral is exact in all methods; what remains is, per lobe, over theta = theta_i
-// (Khungurn 2017, appendix A):
-//   Gamma_X = integral of B_X(theta) exp(E(theta)),
-//   E = -(theta + theta_o)^2 / (2 beta^2) - 2 sharpness sin^2((theta - theta') / 2),   theta' that
-//     of the
-//   axis,
-// with B slow beside exp(E). Fiber frame as in fiber_bcsdf.h.
-// Mean |error| of kPrinted and kDefault at sharpness 25, 100, 400, light within the lobe: R, beta =
-// 10 degrees, at |theta_o| = 60 degrees 4.5, 1.9, .6 % and .4, .03, .001 %; at 75 to 85 degrees 13,
-// 15, 13 % and 1.4, .7, .2 %. Plain Gauss-Hermite nodes, not cut at the ends, have 8, 4, 2 % there;
-// recentring by a Newton step changes nothing. Tested in
-// tests/fibers/scattering/sg_scatter_test.cpp, which prints the table.
+// All methods integrate over azimuth exactly. What remains per lobe is an integral over theta =
+// theta_i (Khungurn 2017, appendix A), with theta' that of the axis and B slow beside exp(E):
+//   Gamma_X = integral of B_X(theta) exp(E(theta))
+//   E = -(theta + theta_o)^2 / (2 beta^2) - 2 sharpness sin^2((theta - theta') / 2)
+// Fiber frame as in fiber_bcsdf.h.
+//
+// Mean |error| at sharpness 25, 100, 400, light within the lobe R with beta = 10 degrees:
+//   |theta_o| = 60 degrees        kPrinted 4.5, 1.9, .6 %    kDefault .4, .03, .001 %
+//   |theta_o| = 75 to 85 degrees  kPrinted 13, 15, 13 %      kDefault 1.4, .7, .2 %
+// Plain Gauss-Hermite nodes, not cut at the ends, have 8, 4, 2 % in the second row. Recentring by a
+// Newton step changes nothing. Tested in tests/fibers/scattering/sg_scatter_test.cpp, which prints
+// the table.
 
 #include "fibers/math/quadrature.h"
 #include "fibers/math/spherical_gaussian.h"

@@ -1,15 +1,15 @@
 #ifndef HEDDLE_FIBERS_TRACING_PATH_WALK_H_
 #define HEDDLE_FIBERS_TRACING_PATH_WALK_H_
-// One light path among explicit fibers, followed backwards from an eye (or from a segment's
-// midpoint): the only place where paths scatter, shared by the transfer stage (flat tile) and the
-// reference path tracer (shell-mapped cloth). At each hit the incoming direction is drawn from the
-// BCSDF given the outgoing one; a scattered ray starts at the hit point and ignores its own fiber.
+// One light path among explicit fibers, followed backwards from an eye or from a segment's origin.
+// This is the only place where paths scatter. The transfer stage (flat tile) and the reference path
+// tracer (shell-mapped cloth) share it. At each hit the incoming direction is drawn from the BCSDF
+// given the outgoing one. A scattered ray starts at the hit point and ignores its own fiber.
 //
 // A Trace offers
-//   struct Vertex { Vec3 position; Vec3 tangent; std::uint16_t material; ... };   // tangent: unit,
-//     same space as directions
-//   std::optional<Vertex> next(const Vertex& from, const Vec3& direction) const;   // first hit,
-//     own fiber ignored
+//   // tangent: unit, in the space of the directions
+//   struct Vertex { Vec3 position; Vec3 tangent; std::uint16_t material; ... };
+//   // first hit, own fiber ignored
+//   std::optional<Vertex> next(const Vertex& from, const Vec3& direction) const;
 // Tested in tests/fibers/tracing/path_walk_test.cpp.
 
 #include <algorithm>
@@ -29,22 +29,21 @@ struct WalkLimits {
   int roulette_from = 6;       // Russian roulette from this scattering event on
 };
 
-/// Where a path left the cloth: direction (towards the light), throughput, the density with which
-/// the last direction was drawn (1/sr), the number of scattering events, and the sum of the
-/// variances of the lobes that scattered it (of inclination about each fiber's cone, square
-/// radians).
+/// Where a path left the cloth.
 struct PathEscape {
-  Vec3 direction;
+  Vec3 direction;  // towards the light
   Rgb throughput;
-  float pdf;
-  int scatterings;
+  float pdf;        // density with which the last direction was drawn, 1/sr
+  int scatterings;  // scattering events
+  // sum of the variances of the lobes that scattered it: of inclination about each fiber's cone,
+  // square radians
   float variance;
 };
 
 /// Follows the path that arrives at `vertex` and leaves it towards `wo` with the given throughput.
 /// at_vertex(vertex, frame, wo, throughput, n) is called at each vertex before scattering event n =
-/// 1, 2, ...; it returns false to end the path there. frame has the fiber frame's axes as columns
-/// (x = tangent). Returns where the path escaped, or nothing where it was absorbed or ended.
+/// 1, 2, .... The path ends there if it returns false. frame has the fiber frame's axes as columns
+/// (x = tangent). Returns where the path escaped, or nothing if it was absorbed or ended.
 template <class Trace, class AtVertex>
 std::optional<PathEscape> walk_path(const Trace& trace, std::span<const BcsdfTable> materials,
                                     typename Trace::Vertex vertex, Vec3 wo, Rgb throughput,

@@ -4,13 +4,15 @@
 // sees.
 //
 // Khungurn 2017 (section 4.1) measures at the midpoint of the segment's axis. In dense yarns the
-// gaps between fibers are narrower than a fiber, and the axis sees far less of the sky than the
-// surface points that an eye can see: measured on flat cotton, single scattering by the axis'
-// visibility is 24 % too dark, with 29 % RMSE over views and lights. So we measure just under the
-// surface, at half the segment's length, on its most exposed side: the direction across the fiber
-// in which open sky lies, averaged over points all around and along the segment. Same cost, same
-// storage; 0.5 % and 7 %. The figures, and the paper's choice beside ours, are in
-// docs/decisions.md. Tested in tests/fibers/tracing/segment_origins_test.cpp.
+// gaps between fibers are narrower than a fiber. The axis then sees far less of the sky than the
+// surface points that an eye can see. On flat cotton, single scattering by the axis' visibility is
+// 24 % too dark, with 29 % RMSE over views and lights.
+//
+// So we measure just under the surface, at half the segment's length, on its most exposed side.
+// That is the direction across the fiber in which open sky lies, averaged over points all around
+// and along the segment. It has the same cost and storage, and errors of 0.5 % and 7 %. The
+// figures, and the paper's choice beside ours, are in docs/decisions.md. Tested in
+// tests/fibers/tracing/segment_origins_test.cpp.
 
 #include <cstdint>
 #include <vector>
@@ -26,8 +28,10 @@ enum class OriginChoice : std::uint8_t {
 
 // Distance of the exposed origin from the axis, in radii. An eye sees the flanks of a fiber too,
 // which lie deeper than its most exposed side. Single scattering on flat gabardine, 41 views x 12
-// lights, mean / RMSE in % of all light: at 1 radius +3.7 / 3.5, at 0.9 +1.3 / 2.4, at 0.8 -1.5
-// / 1.6, at 0.5 -11 / 2.0.
+// lights, in % of all light:
+//   radii   1      0.9    0.8    0.5
+//   mean    +3.7   +1.3   -1.5   -11
+//   RMSE    3.5    2.4    1.6    2.0
 inline constexpr float kExposedDepth = 0.8F;
 
 struct SegmentOrigins {

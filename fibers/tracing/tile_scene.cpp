@@ -16,12 +16,12 @@
 namespace heddle {
 namespace {
 
-// A segment belongs to the tile's structure where its capsule reaches within this share of the
-// tile's size of the tile, and rays are followed as far beyond a tile's edge, so that rounding
-// cannot lose a hit on the edge.
+// A segment belongs to the tile's structure if its capsule reaches within this share of the tile's
+// size of the tile. Rays are followed as far beyond a tile's edge. So rounding cannot lose a hit on
+// the edge.
 constexpr float kEdgeMargin = 1e-4F;
 
-// Embree's own 53 and 50 more while it builds, and our copies of points and indices.
+// Embree's own 53, 50 more while it builds, and our copies of points and indices.
 constexpr std::uint64_t kBytesPerSegment = 150;
 
 struct QueryContext {

@@ -1,10 +1,10 @@
 #ifndef HEDDLE_FIBERS_TRACING_TILE_SCENE_H_
 #define HEDDLE_FIBERS_TRACING_TILE_SCENE_H_
-// Ray queries on the exemplar tile repeated without end and without seams: Embree round curves of
-// one tile (with what reaches in from its neighbours); a ray marches from tile to tile until it
-// hits, leaves the thickness, or reaches t_max. Fabric space, millimetres; ray directions need not
-// have unit length (t is in units of the direction). The only place that includes Embree for
-// fibers. Tested in tests/fibers/tracing/tile_scene_test.cpp.
+// Ray queries on the exemplar tile, repeated without end and without seams. Embree holds the round
+// curves of one tile, with what reaches in from its neighbours. A ray marches from tile to tile
+// until it hits, leaves the thickness, or reaches t_max. Fabric space, millimetres. Ray directions
+// need not have unit length (t is in units of the direction). This is the only place that includes
+// Embree for fibers. Tested in tests/fibers/tracing/tile_scene_test.cpp.
 
 #include <cstdint>
 #include <limits>
@@ -49,8 +49,8 @@ class TileScene {
   static constexpr int kMaxTiles = 4096;
   std::uint64_t abandoned_rays() const;
 
-  /// Mean distance (mm) to the next fiber, own fiber ignored, over `samples` rays from random
-  /// points of random segments (chosen by length) in uniform directions, among the rays that hit.
+  /// Mean distance (mm) to the next fiber, own fiber ignored, over the rays that hit. `samples`
+  /// rays start at random points of random segments (chosen by length) in uniform directions.
   double mean_free_path(std::uint64_t seed, int samples) const;
 
   /// Bytes of the ray-tracing structure.
