@@ -1,11 +1,12 @@
 #ifndef HEDDLE_FIBERS_MATH_ADAPTIVE_CUBATURE_H_
 #define HEDDLE_FIBERS_MATH_ADAPTIVE_CUBATURE_H_
-// Integrals over a rectangle of functions that are smooth but for a few lines: the cell with the
-// largest error is halved in both directions until the errors sum to a share of the result. A
-// cell's value is nine Gauss-Legendre points on each of its quarters, its error the difference to
-// nine points on the whole; so an error is of the coarser rule, and pessimistic.
+// Integrals over a rectangle of functions that are smooth except along a few lines. The cell with
+// the largest error is halved in both directions, until the errors sum to a share of the result. A
+// cell's value comes from nine Gauss-Legendre points on each of its quarters. Its error is the
+// difference to nine points on the whole. That is the error of the coarser rule, so it is
+// pessimistic.
 //
-// A feature narrower than a first cell can be missed: the caller says how many to start with.
+// A feature narrower than a first cell can be missed. The caller says with how many cells to start.
 // Tested in tests/math/adaptive_cubature_test.cpp.
 
 #include <algorithm>

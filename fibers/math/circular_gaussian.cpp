@@ -96,11 +96,10 @@ class Primitive {
   // [n] of the integral: the mean, then factors of sin(n d)
   using Harmonics = std::array<double, kHarmonics + 1>;
 
-  // In u = 2 sin((x - m) / 2) gc dx is exactly exp(-u^2/s^2) du / sqrt(1 - u^2/4), and
-  // 1 / sqrt(1 - u^2/4) = sum over n of binomial(2n, n) (u/4)^(2n). With t = u / s each moment of
-  // t^(2n) exp(-t^2) follows by parts from the one before, m_n = ((2n - 1) m_(n-1) - t^(2n-1)
-  // exp(-t^2)) / 2. erf by Abramowitz and Stegun 7.1.26 (absolute error 1.5e-7), which shares its
-  // exponential with the moments.
+  // With t = u / s each moment of t^(2n) exp(-t^2) follows by parts from the one before:
+  //   m_n = ((2n - 1) m_(n-1) - t^(2n-1) exp(-t^2)) / 2
+  // erf is Abramowitz and Stegun 7.1.26 (absolute error 1.5e-7), which shares its exponential with
+  // the moments.
   template <class T>
   T narrow(const T& x) const {
     const double s = gaussian_.width;

@@ -1,13 +1,13 @@
 #ifndef HEDDLE_FIBERS_MATH_CIRCULAR_GAUSSIAN_H_
 #define HEDDLE_FIBERS_MATH_CIRCULAR_GAUSSIAN_H_
-// Circular Gaussians gc(x; m, s) = exp(2/s^2 (cos(x - m) - 1)) of Iwasaki et al. 2014 and the
-// integral of a product of two of them, in theta and phi, over the visible side of a line (their
-// section 3.2). Angles in radians, width s > 0 (may be infinite: the constant 1).
+// Circular Gaussians gc(x; m, s) = exp(2/s^2 (cos(x - m) - 1)) of Iwasaki et al. 2014, and the
+// integral of a product of two of them, in theta and phi, over the visible side of a line (section
+// 3.2). Angles are in radians. Width s > 0 may be infinite, which is the constant 1.
 //
-// A spherical Gaussian is such a product exactly (eq. 11): with sharpness 2/s^2 and axis (theta_k,
-// phi_k),
-//   G(theta, phi) = gc(theta; theta_k, s) gc(phi; phi_k, azimuthal_width(s, theta, theta_k)).
-// Means lie in [-2 pi, 2 pi]; the domain is always [-pi/2, pi/2] in both angles. Tested, with all
+// A spherical Gaussian of sharpness 2/s^2 and axis (theta_k, phi_k) is such a product exactly (eq.
+// 11):
+//   G(theta, phi) = gc(theta; theta_k, s) gc(phi; phi_k, azimuthal_width(s, theta, theta_k))
+// Means lie in [-2 pi, 2 pi]. The domain is always [-pi/2, pi/2] in both angles. Tested, with all
 // errors, in tests/math/circular_gaussian_test.cpp.
 
 #include <vector>
@@ -44,9 +44,9 @@ CircularGaussianProduct circular_gaussian_product(const CircularGaussian& a,
 /// circle.
 double circular_gaussian_mass(const CircularGaussian& gaussian, double begin, double end);
 
-/// A line in the (theta, phi) plane: visible is theta_gradient (theta - theta_l) + phi_gradient
-/// (phi - phi_k) + distance > 0, with the means (theta_l, phi_k) of the two Gaussians. The gradient
-/// has length 1 and points into the visible side.
+/// A line in the (theta, phi) plane, with the means (theta_l, phi_k) of the two Gaussians. The
+/// gradient has length 1 and points into the visible side, which is
+///   theta_gradient (theta - theta_l) + phi_gradient (phi - phi_k) + distance > 0
 struct VisibilityLine {
   double distance;
   double theta_gradient;
@@ -54,15 +54,15 @@ struct VisibilityLine {
 };
 
 /// The integral of gc(theta) gc(phi) over the visible part of the domain. One of the two integrals
-/// in closed form, the other by one Gauss-Legendre panel of 20 nodes between the points where the
-/// line enters and leaves what the first one covers. Right wherever the means lie, also at +-pi/2:
+/// has a closed form. The other is one Gauss-Legendre panel of 20 nodes, between the points where
+/// the line enters and leaves what the first covers. Right wherever the means lie, also at +-pi/2:
 /// error below 4e-6 of pi min(s, 1) min(s', 1) in all tests. 0.2 to 0.4 us.
 double clipped_gaussians(const CircularGaussian& theta, const CircularGaussian& phi,
                          const VisibilityLine& line);
 
-/// The same for eight at a time, in single precision and with fewer nodes; theta means within
-/// [-pi/2, pi/2], phi means within
-/// [-pi, pi], widths up to 1000. Error below 1e-3 of pi min(s, 1) min(s', 1), 6e-5 RMS.
+/// The same for eight at a time, in single precision and with fewer nodes. theta means lie within
+/// [-pi/2, pi/2] and phi means within [-pi, pi]; widths reach 1000. Error below 1e-3 of pi min(s,
+/// 1) min(s', 1), 6e-5 RMS.
 struct CircularGaussian8 {
   Float8 mean;
   Float8 width;
@@ -80,8 +80,8 @@ double clipped_gaussians_quadrature(const CircularGaussian& theta, const Circula
                                     const VisibilityLine& line);
 
 /// As printed: eq. 13 (plain Gaussians, erf) times eq. 14 (a logistic function of the distance).
-/// Eq. 13 is low by 7 % for widths 1 and by 0.2 % for 1/8, and the whole is off by up to 0.23 of pi
-/// s s' where a mean is near +-pi/2.
+/// Eq. 13 is low by 7 % for widths 1 and by 0.2 % for 1/8. The whole is off by up to 0.23 of pi s
+/// s' for means near +-pi/2.
 double clipped_gaussians_printed(const CircularGaussian& theta, const CircularGaussian& phi,
                                  const VisibilityLine& line);
 

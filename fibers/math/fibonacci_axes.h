@@ -1,10 +1,10 @@
 #ifndef HEDDLE_FIBERS_MATH_FIBONACCI_AXES_H_
 #define HEDDLE_FIBERS_MATH_FIBONACCI_AXES_H_
 // Spherical Fibonacci point sets: directions spread evenly over the upper hemisphere or the sphere,
-// +z the pole.
+// with +z as the pole.
 //
 // Azimuth 4 pi q / (1 + sqrt 5) for q = 1 .. count. Khungurn 2017, section 4.1, prints z = 1 - (q -
-// 1) / count, which covers the upper hemisphere only and puts the first axis on the pole itself;
+// 1) / count. That covers the upper hemisphere only and puts the first axis on the pole itself.
 // Marques et al. 2013 give the full sphere. Tested in tests/math/fibonacci_axes_test.cpp.
 
 #include <algorithm>

@@ -1,9 +1,9 @@
 #ifndef HEDDLE_FIBERS_MATH_FLOAT8_H_
 #define HEDDLE_FIBERS_MATH_FLOAT8_H_
-// Eight floats that are computed at once, in one register where the processor has AVX: the
+// Eight floats that are computed at once, in one register if the processor has AVX. These are the
 // compiler's vector types, and the functions that they lack. Comparisons give masks of Int8 (-1 or
-// 0), `mask ? a : b` chooses by lane. Errors of the functions, over the ranges that they name, are
-// absolute; tested in tests/math/float8_test.cpp.
+// 0), and `mask ? a : b` chooses by lane. Errors of the functions, over the ranges that they name,
+// are absolute. Tested in tests/math/float8_test.cpp.
 
 #include <cmath>
 #include <cstdint>

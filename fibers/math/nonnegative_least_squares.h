@@ -3,10 +3,10 @@
 // min |A w - y|^2 over w >= 0, given the normal equations: gram = A^T A (positive definite),
 // right_side = A^T y.
 //
-// Coordinate descent with the gradient kept up to date: each step solves one coordinate exactly, so
+// Coordinate descent with the gradient kept up to date. Each step solves one coordinate exactly, so
 // the error falls monotonically to the one minimum. It ends when the optimality conditions
 // (gradient 0 where w > 0, not negative where w = 0) hold to kTolerance of the largest entry of the
-// right side, or after kMaxSweeps (a nearly singular gram). Tested in
+// right side. A nearly singular gram ends it after kMaxSweeps. Tested in
 // tests/math/nonnegative_least_squares_test.cpp.
 
 #include <algorithm>

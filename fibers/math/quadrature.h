@@ -1,8 +1,8 @@
 #ifndef HEDDLE_FIBERS_MATH_QUADRATURE_H_
 #define HEDDLE_FIBERS_MATH_QUADRATURE_H_
-// Gaussian quadrature in double precision: Gauss-Legendre on an interval or on a chain of panels,
-// Gauss-Hermite for the weight exp(-x^2) on the real line, and the three-node Gauss rule for that
-// weight cut off at one end.
+// Gaussian quadrature in double precision. There are Gauss-Legendre on an interval or on a chain of
+// panels, Gauss-Hermite for the weight exp(-x^2) on the real line, and the three-node Gauss rule
+// for that weight cut off at one end.
 //
 // Nodes are ascending. Rules on [-1, 1] and Hermite rules are computed once per node count and kept
 // (thread-safe). Tested in tests/math/quadrature_test.cpp.
@@ -26,8 +26,8 @@ const QuadratureRule& gauss_legendre(int count);
 QuadratureRule gauss_legendre(int count, double a, double b);
 
 /// Gauss-Legendre with `count` nodes on each panel between successive breaks. Breaks are sorted
-/// here; those outside [a, b] are dropped and a and b added, so a caller may list every scale at
-/// which its integrand changes.
+/// here. Those outside [a, b] are dropped, and a and b are added. So a caller may list every scale
+/// at which its integrand changes.
 QuadratureRule gauss_legendre_panels(int count, double a, double b, std::vector<double> breaks);
 
 /// Breaks at centre and centre +- scale * 2^j until `reach`: panels that resolve a feature of that

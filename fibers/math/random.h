@@ -1,10 +1,10 @@
 #ifndef HEDDLE_FIBERS_MATH_RANDOM_H_
 #define HEDDLE_FIBERS_MATH_RANDOM_H_
-// Counter-based random numbers: every draw is a pure function of its address (seed, stage, item,
-// sample, dimension), so results depend neither on the number of threads nor on how work is cut,
+// Counter-based random numbers. Every draw is a pure function of its address (seed, stage, item,
+// sample, dimension). So results depend neither on the number of threads nor on how work is cut,
 // and any sample can be drawn again alone.
 //
-// The address is hashed to a 64-bit key; draw number d is the SplitMix64 finaliser (Steele, Lea,
+// The address is hashed to a 64-bit key. Draw number d is the SplitMix64 finaliser (Steele, Lea,
 // Flood 2014) of key + d * golden ratio. Tested in tests/math/random_test.cpp.
 
 #include <cstdint>

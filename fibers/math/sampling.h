@@ -30,8 +30,8 @@ Vec3 sample_spherical_gaussian(const Vec3& axis, float sharpness, RandomStream& 
 float spherical_gaussian_pdf(const Vec3& axis, float sharpness, const Vec3& direction);
 
 /// Angle in [-pi, pi] with the von Mises density exp(concentration (cos(angle) - 1)) / (2 pi I0(k)
-/// exp(-k)), by the rejection of Best and Fisher 1979 (accepts at least 65 %). Concentration k from
-/// 0 to 1e8.
+/// exp(-k)). By the rejection of Best and Fisher 1979, which accepts at least 65 %. Concentration k
+/// from 0 to 1e8.
 class VonMisesSampler {
  public:
   explicit VonMisesSampler(double concentration);
@@ -43,16 +43,15 @@ class VonMisesSampler {
 };
 
 /// Angle with the density of a Gaussian (mean, deviation in radians) cut to [-pi/2, pi/2] and
-/// normalised there. |mean| <= pi/2 and deviation <= pi/2, so that the rejection keeps at least 47
-/// %.
+/// normalised there. |mean| <= pi/2 and deviation <= pi/2: the rejection then keeps at least 47 %.
 float sample_cut_gaussian(float mean, float deviation, RandomStream& random);
 
 /// Share of the uncut Gaussian that lies in [-pi/2, pi/2]: the density above is the Gaussian's
 /// divided by it.
 float cut_gaussian_mass(float mean, float deviation);
 
-/// Weight of a draw by one of two samplers (Veach 1997, exponent 2): its own density and that of
-/// the other one there. Written so that neither square can overflow.
+/// Weight of a draw by one of two samplers (Veach 1997, exponent 2), from the densities of both
+/// there. Written so that neither square can overflow.
 inline float power_heuristic(float chosen, float other) {
   const float ratio = other / chosen;
   return 1.0F / (1.0F + ratio * ratio);

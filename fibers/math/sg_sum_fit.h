@@ -1,16 +1,17 @@
 #ifndef HEDDLE_FIBERS_MATH_SG_SUM_FIT_H_
 #define HEDDLE_FIBERS_MATH_SG_SUM_FIT_H_
 // Fits a binary map on the sphere by a sum of normalised spherical Gaussians of one sharpness about
-// Fibonacci axes: V(w) ~ sum over q of weight[q] G(w; axis[q], sharpness) / M(sharpness), weights
-// in steradians, never negative.
+// Fibonacci axes. Weights are in steradians and never negative:
+//   V(w) ~ sum over q of weight[q] G(w; axis[q], sharpness) / M(sharpness)
 //
-// kVoronoi is Khungurn 2017, section 4.1: a weight is the open solid angle that is nearer to its
-// axis than to any other. kNnls is the non-negative least-squares fit, over the whole sphere, of V
-// blurred by a Gaussian of sharpness kBlur: lights that use the sum see little finer detail, and
-// all integrals have closed forms. A stronger blur (30) costs a quarter to a half more error on
-// maps of real fabrics. Errors of all choices: docs/performance.md, "Visibility". Axes of the upper
-// hemisphere stand for light from the face only: cells whose centre is not above the horizon then
-// count as closed. The axes may be turned about +z by whole columns. Tested in
+// kVoronoi is Khungurn 2017, section 4.1: a weight is the open solid angle nearer to its axis than
+// to any other. kNnls is the non-negative least-squares fit, over the whole sphere, of V blurred by
+// a Gaussian of sharpness kBlur. Lights that use the sum see little finer detail, and all integrals
+// have closed forms. A stronger blur (30) costs a quarter to a half more error on maps of real
+// fabrics. Errors of all choices: docs/performance.md, "Visibility".
+//
+// Axes of the upper hemisphere stand for light from the face only. Cells whose centre is not above
+// the horizon then count as closed. The axes may be turned about +z by whole columns. Tested in
 // tests/math/sg_sum_fit_test.cpp.
 
 #include <vector>

@@ -77,8 +77,8 @@ ShRotation::ShRotation(int order, const Mat3d& rotation) : order_(order) {
   assert(order >= 0 && order <= kMaxShOrder);
   assert((rotation * rotation.transpose() - Mat3d::Identity()).cwiseAbs().maxCoeff() < 1e-3 &&
          rotation.determinant() > 0.0 && "not a rotation");
-  // Angles a and b from the last column. Where it is almost z, a is arbitrary, and g is read from
-  // the second row of Rz(-a) R, so that a + g is right even then.
+  // Where R z is almost z, a is arbitrary. g is read from the second row of Rz(-a) R, so a + g is
+  // right even then.
   const double tilt = std::hypot(rotation(0, 2), rotation(1, 2));
   const double cos_a = tilt > 0.0 ? rotation(0, 2) / tilt : 1.0;
   const double sin_a = tilt > 0.0 ? rotation(1, 2) / tilt : 0.0;

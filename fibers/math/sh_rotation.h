@@ -1,9 +1,9 @@
 #ifndef HEDDLE_FIBERS_MATH_SH_ROTATION_H_
 #define HEDDLE_FIBERS_MATH_SH_ROTATION_H_
-// Rotation of spherical-harmonic coefficients: D(R) with Y(R w) = D(R) Y(w), so that coefficients c
-// of f become D(R) c, the coefficients of f(R^T w) (f turned by R).
+// Rotation of spherical-harmonic coefficients: D(R) with Y(R w) = D(R) Y(w). Coefficients c of f
+// become D(R) c, the coefficients of f(R^T w), which is f turned by R.
 //
-// D = Z(a) J Z(-b) J Z(g) with R = Rz(a) Ry(b) Rz(g); Z is a rotation about z (pairs +-m mix), J
+// D = Z(a) J Z(-b) J Z(g) with R = Rz(a) Ry(b) Rz(g). Z is a rotation about z (pairs +-m mix), J
 // the constant matrix of the swap y <-> z. Symmetry leaves about a quarter of J's entries, and only
 // those are visited. R must be a proper rotation, orthogonal to 1e-3 (asserted). Cost at order 5:
 // 0.4 us for three colours. Tested in tests/math/sh_rotation_test.cpp.

@@ -24,7 +24,7 @@ double circular(double angle) {
 }
 
 // acos(1 - h) for h in [0, 2], by Abramowitz and Stegun 4.4.46 (absolute error 2e-8, plus
-// rounding): written out because the compiler makes a vector loop of it.
+// rounding). It is written out because the compiler then makes a vector loop of it.
 inline float angle_of(float h) {
   const float x = std::abs(1 - h);
   float p = -0.0012624911F;

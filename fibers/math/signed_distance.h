@@ -1,13 +1,13 @@
 #ifndef HEDDLE_FIBERS_MATH_SIGNED_DISTANCE_H_
 #define HEDDLE_FIBERS_MATH_SIGNED_DISTANCE_H_
 // Signed geodesic distance on the sphere, in radians, from a direction to the nearest edge between
-// open and closed cells of a lat-long map: positive where the map is open, negative where it is
-// closed, +pi or -pi if all cells are alike.
+// open and closed cells of a lat-long map. It is positive where the map is open and negative where
+// it is closed. It is +pi or -pi if all cells are alike.
 //
-// Wang et al. 2009 and Khungurn 2017, section 4.1, measure to the nearest opposite cell *centre*,
-// which is biased outward by half a cell and, near the poles, by up to 2 degrees; here it is the
+// Wang et al. 2009 and Khungurn 2017, section 4.1, measure to the nearest opposite cell *centre*.
+// That is biased outward by half a cell and, near the poles, by up to 2 degrees. Here it is the
 // distance to the edge itself. Any way from a cell to an opposite one crosses a side shared by two
-// cells that differ, so the edge is the union of those sides: arcs of parallels and of meridians.
+// cells that differ. So the edge is the union of those sides: arcs of parallels and of meridians.
 // Tested in tests/math/signed_distance_test.cpp.
 
 #include <cstdint>
@@ -36,13 +36,15 @@ class ExactSignedDistance {
   std::vector<Side> sides_;
 };
 
-/// Fast, at all cell centres. On one parallel the distance grows with the azimuth between, so one
+/// Fast, at all cell centres. On one parallel the distance grows with the azimuth between. So one
 /// scan per parallel finds the nearest corner or side of each column, and the minimum over
-/// parallels is a vector loop without branches; the feet of perpendiculars on meridian sides, which
-/// no corner stands for, are searched by rising distance. Nothing is left out: the result differs
-/// from ExactSignedDistance by float rounding only. Distances are compared as h = 1 - cos d, with a
-/// rounding error below 3e-7 of its value, so the error is below 3e-7 tan(d / 2) and, near the
-/// antipode, below sqrt(6e-7); the inverse cosine adds 2e-7.
+/// parallels is a vector loop without branches. Feet of perpendiculars on meridian sides have no
+/// such corner, and are searched by rising distance. Nothing is left out: the result differs from
+/// ExactSignedDistance by float rounding only.
+///
+/// Distances are compared as h = 1 - cos d, with a rounding error below 3e-7 of its value. The
+/// error is therefore below 3e-7 tan(d / 2) and, near the antipode, below sqrt(6e-7). The inverse
+/// cosine adds 2e-7.
 class SignedDistanceTransform {
  public:
   static constexpr double kMaxError = 5e-6;              // radians, for distances up to 3

@@ -10,9 +10,10 @@
 namespace heddle {
 namespace {
 
-// Ratios of successive Bessel functions, r_n = I_{n + shift} / I_{n - 1 + shift} = x / (2 (n +
-// shift) + x r_{n+1}), downward from an order so high that the error of the start has died out (it
-// shrinks by r^2 in each step, and 1 - r_n is about n / x for large x, so 8 sqrt(x) steps suffice).
+// Ratios of successive Bessel functions,
+//   r_n = I_{n + shift} / I_{n - 1 + shift} = x / (2 (n + shift) + x r_{n+1})
+// from high order downwards. The error of the start shrinks by r^2 in each step. For large x, 1 -
+// r_n is about n / x, so 8 sqrt(x) steps suffice.
 std::vector<double> ratios_by_downward_recurrence(int order, double x, double shift) {
   const int start = order + 30 + static_cast<int>(std::ceil(8.0 * std::sqrt(x)));
   double ratio = x / (2.0 * (start + shift) + x);

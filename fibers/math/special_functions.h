@@ -2,9 +2,9 @@
 #define HEDDLE_FIBERS_MATH_SPECIAL_FUNCTIONS_H_
 // Special functions of the scattering models, in forms that neither overflow nor cancel.
 //
-// I0(x), i_l(x) and differences of erf as printed overflow (I0 in float from x = 88) or cancel;
-// what is here is scaled by exp(-x), or a ratio, or a difference taken on the right side. Errors
-// are relative; tested in tests/math/special_functions_test.cpp.
+// As printed, I0(x), i_l(x) and differences of erf overflow (I0 in float from x = 88) or cancel.
+// The forms here are scaled by exp(-x), or are ratios, or are differences taken on the right side.
+// Errors are relative. Tested in tests/math/special_functions_test.cpp.
 
 #include <vector>
 
@@ -43,13 +43,12 @@ T sine_of_quarter(const T& x) {
 }
 
 /// Mean of cos^2 over a Gaussian cut to [-pi/2, pi/2]:
-///   Gn(mu; beta) = 1 / (sqrt(2 pi) beta) * integral over [-pi/2, pi/2] of exp(-(t - mu)^2 / (2
-///     beta^2))
-///   cos^2(t) dt,
-/// the Gn(mu; lambda) of Khungurn 2015 with lambda = 1 / (2 beta^2). |mu| <= pi/2 and beta > 0 in
-/// radians. By quadrature: the closed form with erf of a complex argument gives NaN from beta = 1
-/// degree down. Never 0: about beta^2 / 2 at mu = +-pi/2. Error below 1e-12 for beta from 0.01 to
-/// 90 degrees.
+///   Gn(mu; beta) = integral over [-pi/2, pi/2] of exp(-(t - mu)^2 / (2 beta^2)) cos^2(t) dt
+///                  / (sqrt(2 pi) beta)
+/// This is the Gn(mu; lambda) of Khungurn 2015 with lambda = 1 / (2 beta^2). |mu| <= pi/2 and beta
+/// > 0 in radians. By quadrature: the closed form with erf of a complex argument gives NaN from
+/// beta = 1 degree down. Never 0: about beta^2 / 2 at mu = +-pi/2. Error below 1e-12 for beta from
+/// 0.01 to 90 degrees.
 double gaussian_cos2_mean(double mu, double beta);
 
 }  // namespace heddle

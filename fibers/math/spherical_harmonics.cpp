@@ -10,7 +10,7 @@ namespace {
 constexpr int kBands = kMaxShOrder + 1;
 
 // Normalised associated Legendre functions without their factor sin^m(theta) obey
-//   P[m][m] = start[m],  P[l][m] = rise[l][m] z P[l-1][m] - fall[l][m] P[l-2][m].
+//   P[m][m] = start[m],  P[l][m] = rise[l][m] z P[l-1][m] - fall[l][m] P[l-2][m]
 // start includes the sqrt(2) of the real harmonics with m > 0.
 template <typename T>
 struct LegendreTable {

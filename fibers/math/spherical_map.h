@@ -3,9 +3,9 @@
 // Binary function on the sphere, constant on the cells of a lat-long grid, as packed bits: which
 // directions are open.
 //
-// N x N cells: row r holds polar angles from pi r / N to pi (r + 1) / N measured from +z, column c
-// azimuths atan2(y, x) in [2 pi c / N, 2 pi (c + 1) / N). Cell (r, c) is bit r N + c, least
-// significant bit of each word first. Tested in tests/math/spherical_map_test.cpp.
+// There are N x N cells. Row r holds polar angles from pi r / N to pi (r + 1) / N, measured from
+// +z. Column c holds azimuths atan2(y, x) in [2 pi c / N, 2 pi (c + 1) / N). Cell (r, c) is bit r N
+// + c, least significant bit of each word first. Tested in tests/math/spherical_map_test.cpp.
 
 #include <algorithm>
 #include <cassert>
