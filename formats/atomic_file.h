@@ -1,14 +1,14 @@
 #ifndef HEDDLE_FORMATS_ATOMIC_FILE_H_
 #define HEDDLE_FORMATS_ATOMIC_FILE_H_
-// Files and folders that readers never see half done: made under a temporary name in the same
-// folder, flushed, checked for size, renamed. The old file or folder stays until then, and stays
-// whole where anything fails.
+// Files and folders that readers never see half done. They are made under a temporary name in the
+// same folder, flushed, checked for size and renamed. The old file or folder stays until then. It
+// stays whole if anything fails.
 //   - Temporary names are `.heddle-MACHINE-PROCESS-NUMBER.tmp`, however long the target's name is.
 //     MACHINE is a hash of the host and the space of process numbers, so that machines and
 //     containers can share a folder.
-//   - What a killed process left in a folder is removed by the next process that writes there: at
-//     once where the process ran on this machine, after a day where it ran on another.
-//   - A target that is a symbolic link keeps it: what the link points to is replaced.
+//   - The next process that writes to a folder removes what a killed process left there: at once if
+//     that ran on this machine, after a day if it ran on another.
+//   - A target that is a symbolic link keeps it. The file that the link points to is replaced.
 //   - A folder that cannot be flushed after the rename is no failure: the file is in its place.
 // Errors: FileError with the target's name and the system's reason. Tested in
 // tests/formats/atomic_file_test.cpp.
@@ -57,7 +57,7 @@ class AtomicFile {
   void seek(std::uint64_t position);
   std::uint64_t position() const { return position_ + buffer_.size(); }
 
-  /// Throws again what a write has thrown: some libraries swallow it.
+  /// Throws again the error of an earlier write: some libraries swallow it.
   void check() const;
   /// Writes what is left, flushes, checks the size, renames.
   void commit();
@@ -75,19 +75,18 @@ class AtomicFile {
   int failure_ = 0;  // the system's reason
 };
 
-/// FileError where a file could not be put there now: for commands that work long before they
-/// write.
+/// FileError if a file could not be put there now. For commands that work long before they write.
 void require_writable(const std::filesystem::path& target);
 
 void write_file_atomically(const std::filesystem::path& path, std::span<const std::byte> bytes);
 void write_file_atomically(const std::filesystem::path& path, std::string_view text);
 
-/// Removes what lies under this process's temporary names, and lets nothing be committed any more:
-/// for a process that ends without running destructors.
+/// Removes what lies under this process's temporary names. From then on nothing is committed any
+/// more. For a process that ends without running destructors.
 void remove_own_temporaries() noexcept;
 
-/// The whole file as bytes. Errors: FileError with the system's reason; MemoryError where the
-/// machine has no room for it.
+/// The whole file as bytes. Errors: FileError with the system's reason; MemoryError if the machine
+/// has no room for it.
 std::vector<std::byte> read_whole_file(const std::filesystem::path& path);
 
 }  // namespace heddle

@@ -21,7 +21,7 @@ namespace {
 
 constexpr int kMaxExtent = 16384;
 constexpr std::uint64_t kMaxValues = std::uint64_t{1} << 28;
-// The new encoding reaches 16 pixels per byte; the old one has no bound, but nobody's sky is this
+// The new encoding reaches 16 pixels per byte. The old one has no bound, but no real sky is this
 // even.
 constexpr std::uint64_t kMaxPixelsPerByte = 1024;
 
@@ -144,7 +144,7 @@ class Reader {
 
   void read_line(std::vector<Pixel>& line) {
     const Pixel first = pixel();
-    // Widths that the new encoding cannot have are never encoded so.
+    // The new encoding does not exist for these widths.
     const bool components = line.size() >= 8 && line.size() <= 32767 && first[0] == 2 &&
                             first[1] == 2 && first[2] < 128;
     if (components) {

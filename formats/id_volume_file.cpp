@@ -30,9 +30,9 @@ constexpr const char* kSizeKey = "size";
 constexpr const char* kVoxelKey = "voxel_mm";
 constexpr const char* kOriginKey = "origin_mm";
 
-// OpenVDB puts a random identifier (36 characters) into the header of each file it writes: after
-// the magic number (8 bytes), three version numbers (4 bytes each) and a flag (1 byte). Here it is
-// the file's checksum.
+// OpenVDB puts a random identifier (36 characters) into the header of each file. It follows the
+// magic number (8 bytes), three version numbers (4 bytes each) and a flag (1 byte). Here it is the
+// file's checksum.
 constexpr std::size_t kIdentifierAt = 21;
 constexpr std::string_view kZeroIdentifier = "00000000-0000-0000-0000-000000000000";
 

@@ -1,10 +1,12 @@
 #ifndef HEDDLE_FORMATS_ID_VOLUME_FILE_H_
 #define HEDDLE_FORMATS_ID_VOLUME_FILE_H_
-// A dense grid of ids as an OpenVDB Int32Grid (background -1 = empty) with string metadata; the
-// only place that includes OpenVDB. OpenVDB 10 is not safe on corrupt files, and sees none: the
-// identifier in the file's header, random elsewhere, is the XXH3-128 of all other bytes, and is
-// verified before the library gets them. Limits: 4096 voxels along an axis, 2^31 in all. Equal
-// content gives equal bytes. Errors: FileError. Tested in tests/formats/id_volume_file_test.cpp.
+// A dense grid of ids as an OpenVDB Int32Grid (background -1 = empty) with string metadata. The
+// only place that includes OpenVDB.
+//
+// OpenVDB 10 is not safe on corrupt files, so it never gets one. The identifier in the file's
+// header, random elsewhere, is the XXH3-128 of all other bytes. It is verified before the library
+// gets them. Limits: 4096 voxels along an axis, 2^31 in all. Equal content gives equal bytes.
+// Errors: FileError. Tested in tests/formats/id_volume_file_test.cpp.
 
 #include <array>
 #include <cstdint>

@@ -91,8 +91,8 @@ Imf::Slice slice_of(Imf::PixelType type, const T* values, const Imath::Box2i& wi
                           sizeof(T) * static_cast<std::size_t>(width));
 }
 
-/// OpenEXR writes into a file under construction, whose errors reach the caller even where the
-/// library swallows them.
+/// OpenEXR writes into a file under construction. Its errors reach the caller even if the library
+/// swallows them.
 class OutputStream : public Imf::OStream {
  public:
   OutputStream(const std::string& name, AtomicFile& file)
@@ -138,7 +138,7 @@ void write_exr_to(Imf::OStream& stream, const Image& image) {
   file.writePixels(image.height);
 }
 
-/// OpenEXR takes a file that cannot be read for one of another format.
+/// OpenEXR reports an unreadable file as one of another format.
 void require_readable(const std::filesystem::path& path) {
   errno = 0;
   std::ifstream file(path, std::ios::binary);
@@ -175,14 +175,14 @@ class ExrHeader {
   const Imf::Header& header() const { return header_; }
   int width() const { return width_; }
   int height() const { return height_; }
-  /// Rows to ask for at once: whole chunks, so that none is decoded twice (a file of tiles keeps a
-  /// row of them).
+  /// Rows to ask for at once. They are whole chunks, so that none is decoded twice. A file of tiles
+  /// keeps a row of them.
   int rows_at_once() const {
     return std::min(height_, std::max(kRowsAtOnce, bound_of(header_.compression()).rows));
   }
 
-  /// Bytes to read the picture: its values, a few rows of them, and what the library holds of
-  /// chunks or tiles.
+  /// Bytes needed to read the picture: its values, a few rows of them, and the library's chunks or
+  /// tiles.
   std::uint64_t memory() const {
     constexpr std::uint64_t kCopies = 6;  // of a chunk, in the library's decoders
     const auto width = static_cast<std::uint64_t>(width_);

@@ -8,7 +8,7 @@
 
 namespace heddle {
 
-/// Objects and arrays within each other; our own files and requests need fewer than ten.
+/// How deep objects and arrays may be nested. Our own files and requests need fewer than ten.
 inline constexpr int kMaxJsonDepth = 64;
 
 /// Is any bracket of the text nested deeper than kMaxJsonDepth? Brackets inside strings do not

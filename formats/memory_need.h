@@ -16,14 +16,14 @@ class MemoryError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Bytes: the least of the system's available memory, the room in this process's control group and
-/// the room under its own limit of address space (`ulimit -v`).
+/// Bytes: the least of three limits. They are the system's available memory, the room in this
+/// process's control group, and the room under its own limit of address space (`ulimit -v`).
 std::uint64_t available_memory();
 
 /// "16.8 GB", "310 MB"; powers of 1000.
 std::string memory_text(std::uint64_t bytes);
 
-/// Throws MemoryError where `bytes` are not available. `purpose` is the sentence's subject: "a
+/// Throws MemoryError if `bytes` are not available. `purpose` is the subject of the sentence: "a
 /// picture of 16384 x 16384 pixels".
 void require_memory(std::uint64_t bytes, const std::string& purpose);
 

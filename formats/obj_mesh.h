@@ -21,18 +21,18 @@ struct ObjMesh {
   std::vector<std::array<std::uint32_t, 3>> triangles;  // [triangle] vertex indices
 };
 
-/// What the file's numbers mean in millimetres; 0 where that is not known.
+/// What the file's numbers mean in millimetres; 0 if that is not known.
 struct ObjUnits {
   double mm_per_unit = 0;  // of positions
   double mm_per_uv = 0;    // of texture coordinates, on flat cloth
 };
 
-/// Coordinates in millimetres reach as far as a camera may be moved. Here, at 1 km, a float tells
-/// places 0.06 mm apart; from 1e19 mm on, squares of lengths overflow, and Embree with them.
+/// Coordinates in millimetres reach as far as a camera may be moved. At 1 km a float resolves
+/// places 0.06 mm apart. From 1e19 mm on, squares of lengths overflow, and Embree aborts.
 inline constexpr double kMaxCoordinateMm = 1e6;
 
 /// Limits: 50 million triangles; coordinates whose unit is known, kMaxCoordinateMm either way. A
-/// file where only some faces have UVs (or normals) is refused.
+/// file in which only some faces have UVs (or normals) is refused.
 ObjMesh read_obj(const std::filesystem::path& path, const ObjUnits& units = {});
 
 }  // namespace heddle

@@ -60,8 +60,8 @@ std::optional<std::uint64_t> byte_count(TensorType type, const std::vector<std::
   return bytes;
 }
 
-/// Refuses what a tree of values would hide or could choke on: repeated keys, deep nesting, too
-/// many names.
+/// Refuses what a tree of values would hide or fail on: repeated keys, deep nesting, too many
+/// names.
 class HeaderCheck : public nlohmann::json_sax<Json> {
  public:
   const std::string& problem() const { return problem_; }

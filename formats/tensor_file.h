@@ -2,9 +2,9 @@
 #define HEDDLE_FORMATS_TENSOR_FILE_H_
 // Tensor files in the published safetensors layout: u64 little-endian header length, JSON header,
 // raw row-major little-endian tensors, contiguous. Equal content gives equal bytes (fixed key
-// order, no time stamps). Reader: every limit of the reference reader is enforced (header size,
-// exact contiguity, exact file length, known dtypes, checked products, no duplicate keys); see
-// formats/README.md. Errors: FileError naming the file and the reason. Tested in
+// order, no time stamps). The reader enforces every limit of the reference reader: header size,
+// exact contiguity, exact file length, known dtypes, checked products, no duplicate keys
+// (formats/README.md). Errors: FileError naming the file and the reason. Tested in
 // tests/formats/tensor_file_test.cpp.
 
 #include <cstddef>

@@ -21,8 +21,8 @@ namespace {
 
 // Hand-written configs take a few kilobytes. A document takes up to 140 times its size in memory.
 constexpr std::size_t kMaxDocumentBytes = std::size_t{1} << 20;
-// Tables and arrays within each other. Ours need fewer than ten; toml++ and this file walk them by
-// recursion.
+// How deep tables and arrays may be nested. Ours need fewer than ten. toml++ and this file walk
+// them by recursion.
 constexpr std::size_t kMaxDepth = 64;
 
 struct Unit {
@@ -147,9 +147,9 @@ std::string excerpt(std::string_view line, std::size_t column) {
   return "\n  " + printable(source) + "\n  " + caret + "^";
 }
 
-/// Finds where tables and arrays are nested deeper than kMaxDepth, before toml++ builds them. Exact
-/// up to the first syntax error, which toml++ reports: names of a header, dots of keys, and
-/// brackets count; those in strings and comments do not.
+/// Finds where tables and arrays are nested deeper than kMaxDepth, before toml++ builds them. Names
+/// of a header, dots of keys, and brackets count; those in strings and comments do not. Exact up to
+/// the first syntax error, which toml++ reports.
 class DepthScan {
  public:
   explicit DepthScan(std::string_view text) : text_(text) {}

@@ -1,10 +1,10 @@
 #ifndef HEDDLE_FORMATS_TOML_TABLE_H_
 #define HEDDLE_FORMATS_TOML_TABLE_H_
 // TOML values that know their line. A reader asks for every key it understands, with unit suffix
-// and range; finish() then rejects what nobody asked for. Every error is a ConfigError
+// and range. finish() then rejects every key that nobody asked for. Every error is a ConfigError
 // "file:line:col: what was expected", followed by the source line and a caret. NaN and infinities
-// are never accepted. Every key asked for is recorded (asked_keys), so that a test can hold the
-// documentation against the parser. Tested in tests/formats/toml_table_test.cpp.
+// are never accepted. Every key asked for is recorded (asked_keys), so that a test can compare the
+// documentation with the parser. Tested in tests/formats/toml_table_test.cpp.
 
 #include <array>
 #include <cstdint>

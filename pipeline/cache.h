@@ -1,19 +1,17 @@
 #ifndef HEDDLE_PIPELINE_CACHE_H_
 #define HEDDLE_PIPELINE_CACHE_H_
-// The cache of stage artifacts: a folder CACHE/STAGE/ per stage, an artifact named by its key,
-// which is a hash of all that went into it. An artifact appears whole (it is renamed into place),
-// never changes, and is used only where it agrees with its record (artifact_record.h). Several
+// The cache of stage artifacts. Each stage has a folder CACHE/STAGE/. An artifact is named by its
+// key, a hash of everything that went into it. An artifact appears whole (it is renamed into place)
+// and never changes. It is used only if it agrees with its record (artifact_record.h). Several
 // processes may share a cache: those that build the same key write the same bytes.
 //
-//   CACHE/STAGE/KEY.safetensors (or .vdb, .json, or a folder KEY/)   the artifact
-//   CACHE/STAGE/KEY.record.json                                      its checksum, and what it took
-//                                                                    to build it
-//   CACHE/STAGE/KEY.partial/FIRST.safetensors, FIRST.record.json     finished chunks of a long
-//                                                                    stage, kept until it is
-//                                                                    published
+//   CACHE/STAGE/KEY.safetensors      the artifact (or .vdb, .json, or a folder KEY/)
+//   CACHE/STAGE/KEY.record.json      its checksum, and what it took to build it
+//   CACHE/STAGE/KEY.partial/         finished chunks of a long stage, kept until it is published:
+//                                    FIRST.safetensors, FIRST.record.json
 //
-// Default folder: $HEDDLE_CACHE, else out/cache below the working directory.
-// Errors: FileError with the system's reason. Tested in tests/pipeline/cache_test.cpp.
+// Default folder: $HEDDLE_CACHE, else out/cache below the working directory. Errors: FileError with
+// the system's reason. Tested in tests/pipeline/cache_test.cpp.
 
 #include <cstdint>
 #include <filesystem>
@@ -65,7 +63,7 @@ class PartialChunks {
   std::filesystem::path file(std::uint64_t first) const;
   std::filesystem::path record(std::uint64_t first) const;
   bool has(std::uint64_t first) const { return std::filesystem::exists(file(first)); }
-  /// FileError where the chunk is absent or differs from its record.
+  /// FileError if the chunk is absent or differs from its record.
   void verify(std::uint64_t first) const;
   bool folder_exists() const { return std::filesystem::exists(folder_); }
   /// Removes the folder; called once the artifact is published.

@@ -30,13 +30,13 @@ using Json = nlohmann::ordered_json;
 // A chart takes an hour, not a night, on two cores with pictures of this width.
 constexpr int kDefaultWidth = 96;
 
-// Shorter renderings are repeated, up to kRepeats times in all, and the shortest time counts: what
-// disturbs a measurement makes it longer.
+// Shorter renderings are repeated, up to kRepeats times in all, and the shortest time counts:
+// disturbances only make a measurement longer.
 constexpr double kLongEnough = 1.0;  // s
 constexpr int kRepeats = 3;
 
-// Blocks of pixels for the intervals: enough of them that 1.96 standard errors are 95 %, no larger
-// than what neighbours share.
+// Blocks of pixels for the intervals. There are enough of them that 1.96 standard errors are 95 %.
+// They are no larger than the noise that neighbours share.
 constexpr int kBlocks = 48;
 constexpr int kLargestBlock = 8;
 
@@ -132,8 +132,7 @@ class ChartMaker {
   fs::path file(const std::string& name) const { return runs_ / name; }
   static fs::path in_folder(const std::string& name) { return fs::path("runs") / name; }
 
-  /// What an earlier chart noted of a picture, if this one may count on it: the same program on the
-  /// same machine.
+  /// An earlier chart's record of a picture, if this chart may use it: same program, same machine.
   std::optional<Json> earlier_record(const std::string& key) const {
     const fs::path record_file = file(key + ".json");
     const bool may = options_->resume || made_.contains(key);

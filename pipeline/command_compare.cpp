@@ -7,7 +7,7 @@
 namespace heddle {
 namespace {
 
-/// A picture that cannot be read cannot be compared: status 2, as 1 says "beyond the limit" here.
+/// A picture that cannot be read cannot be compared: status 2. Here 1 means "beyond the limit".
 Image read_comparable(const std::filesystem::path& path) {
   try {
     return read_exr(path);

@@ -9,8 +9,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// FileError where a pack may not take this place. Packs may be replaced, whole or cut short, but
-/// nothing else is lost.
+/// FileError if a pack may not take this place. It may replace another pack, whole or cut short. It
+/// must not destroy anything else.
 void require_pack_or_nothing(const fs::path& place) {
   if (!fs::exists(place)) return;
   if (!fs::is_directory(place)) throw FileError(place.string() + ": exists and is not a folder");

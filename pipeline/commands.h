@@ -39,9 +39,9 @@ struct RunOptions {
   std::filesystem::path output;  // folder; out/SCENE where empty
   std::optional<int> order;
 };
-/// For every view of the scene, in `output`: NAME.exr, NAME.png and NAME.json, and where the view
-/// asks for a reference NAME.reference.* (path-traced) and NAME.difference.* of a crop. Pictures
-/// are cached like artifacts of stages.
+/// Makes NAME.exr, NAME.png and NAME.json in `output` for every view of the scene. A view that asks
+/// for a reference also gets NAME.reference.* (path-traced) and NAME.difference.* of a crop.
+/// Pictures are cached like artifacts of stages.
 int run_command(const RunOptions& options, const CommonOptions& common);
 
 struct RenderOptions {
@@ -59,7 +59,7 @@ struct RenderOptions {
   std::optional<double> tolerance;  // method, samples and data by a plan
   int pictures = 1;                 // that the plan reckons with
 };
-/// Status 1 where no way meets the tolerance; then nothing is rendered.
+/// Status 1 if no way meets the tolerance; then nothing is rendered.
 int render_command(const RenderOptions& options, const CommonOptions& common);
 
 struct PlanOptions {
@@ -69,9 +69,9 @@ struct PlanOptions {
   double tolerance = 0;  // relative RMSE
   int pictures = 1;
 };
-/// Prints what would be built and used, what it costs and why (docs/plan.md). Builds accuracy
-/// tables where they are missing and path tracing is not cheaper than that. Status 1 where no way
-/// meets the tolerance.
+/// Prints what would be built and used, what it costs and why (docs/plan.md). Builds missing
+/// accuracy tables unless path tracing is cheaper than that. Status 1 if no way meets the
+/// tolerance.
 int plan_command(const PlanOptions& options, const CommonOptions& common);
 
 struct CompareOptions {
@@ -82,7 +82,7 @@ struct CompareOptions {
   std::optional<double> max_rmse;
   std::optional<double> max_mean;
 };
-/// Status 1 where a limit is exceeded; ConfigError (2) where the pictures cannot be compared.
+/// Status 1 if a limit is exceeded; ConfigError (2) if the pictures cannot be compared.
 int compare_command(const CompareOptions& options, const CommonOptions& common);
 
 struct ChartOptions {
@@ -99,9 +99,9 @@ struct ChartOptions {
   bool quick = false;
   bool resume = false;
 };
-/// Speed against accuracy, over the methods and their settings: chart.csv, chart.json, chart.svg,
-/// chart-local.svg, index.html and runs/ in `output` (docs/chart.md). Status 1 where every run
-/// failed.
+/// Speed against accuracy, over the methods and their settings. Writes chart.csv, chart.json,
+/// chart.svg, chart-local.svg, index.html and runs/ in `output` (docs/chart.md). Status 1 if every
+/// run failed.
 int chart_command(const ChartOptions& options, const CommonOptions& common);
 
 /// Prints what a file holds.

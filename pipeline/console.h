@@ -1,8 +1,8 @@
 #ifndef HEDDLE_PIPELINE_CONSOLE_H_
 #define HEDDLE_PIPELINE_CONSOLE_H_
-// What the program says while it works: messages and progress on standard error, so that data on
-// standard output stays clean. On a terminal progress is one line that is redrawn; otherwise a
-// plain line per 10 % or per minute. Nothing is shown for work that ends within a second, or with
+// What the program says while it works. Messages and progress go to standard error, so that data on
+// standard output stays clean. On a terminal, progress is one line that is redrawn. Otherwise it is
+// a plain line per 10 % or per minute. Nothing is shown for work that ends within a second, or with
 // --quiet. Tested in tests/pipeline/console_test.cpp.
 
 #include <chrono>
@@ -40,8 +40,8 @@ class Console {
   std::size_t drawn_ = 0;  // characters of the line that is being redrawn
 };
 
-/// Says what a large piece of work takes of memory, from 1 GB on. MemoryError where the machine has
-/// less. `work`: with its size, "synth: 1.4e+07 segments".
+/// Says how much memory a large piece of work takes, from 1 GB on. MemoryError if the machine has
+/// less. `work` is the work with its size: "synth: 1.4e+07 segments".
 void announce_memory(Console& console, const std::string& work, std::uint64_t bytes);
 
 /// Progress of `total` items of work, `done` of which came from an earlier run. Safe to advance

@@ -25,8 +25,8 @@ std::atomic<int> received_signal = 0;
 std::atomic<bool> is_ending = false;  // whoever sets it ends the process
 std::string message = "interrupted";
 
-/// Without waiting for a reader that does not come, and without dying of one that is gone (SIGPIPE
-/// is blocked here).
+/// Writes without waiting for a reader, and without dying if the reader is gone (SIGPIPE is blocked
+/// here).
 void write_to_standard_error(const std::string& text) {
   pollfd standard_error = {.fd = STDERR_FILENO, .events = POLLOUT, .revents = 0};
   if (::poll(&standard_error, 1, 0) != 1 || (standard_error.revents & POLLOUT) == 0) return;

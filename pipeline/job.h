@@ -1,8 +1,8 @@
 #ifndef HEDDLE_PIPELINE_JOB_H_
 #define HEDDLE_PIPELINE_JOB_H_
-// One command's console, cache and report. The report goes to standard output: the paths of what
-// was made, one a line, or with --json one object {"stages": [...], "artifacts": [...], "seconds":
-// ...}.
+// One command's console, cache and report. The report goes to standard output. It is the paths of
+// what was made, one a line, or with --json one object:
+//   {"stages": [...], "artifacts": [...], "seconds": ...}
 
 #include <chrono>
 #include <filesystem>

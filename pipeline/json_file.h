@@ -1,7 +1,7 @@
 #ifndef HEDDLE_PIPELINE_JSON_FILE_H_
 #define HEDDLE_PIPELINE_JSON_FILE_H_
-// Our own JSON files: reports, records, accuracy tables. Errors: FileError naming the file, for
-// what is unreadable, no JSON, or nested deeper than kMaxJsonDepth. Tested in
+// Our own JSON files: reports, records, accuracy tables. Errors: FileError naming a file that is
+// unreadable, no JSON, or nested deeper than kMaxJsonDepth. Tested in
 // tests/pipeline/json_file_test.cpp.
 
 #include <filesystem>

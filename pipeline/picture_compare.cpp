@@ -8,7 +8,7 @@
 namespace heddle {
 namespace {
 
-/// As layer_of, for callers to whom a missing layer means that the pictures cannot be compared.
+/// As layer_of, for callers that cannot compare pictures with a missing layer.
 std::vector<Rgb> colors_of(const Image& image, const std::string& layer, const std::string& name) {
   try {
     return layer_of(image, layer, name);

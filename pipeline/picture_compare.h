@@ -1,8 +1,8 @@
 #ifndef HEDDLE_PIPELINE_PICTURE_COMPARE_H_
 #define HEDDLE_PIPELINE_PICTURE_COMPARE_H_
-// Error metrics of a picture against a reference, and a picture of the difference; what `heddle
-// compare` and the crops of `heddle run` report. A reference with the layers half0 and half1 is
-// used as two independent halves, so that its noise does not count as error. Tested in
+// Error metrics of a picture against a reference, and a picture of the difference. `heddle compare`
+// and the crops of `heddle run` report them. A reference with the layers half0 and half1 is used as
+// two independent halves, so that its noise does not count as error. Tested in
 // tests/pipeline/picture_compare_test.cpp.
 
 #include <filesystem>
@@ -22,8 +22,8 @@ struct PictureComparison {
   std::vector<std::uint8_t> preview;
 };
 
-/// Compares the colours of one layer ("" is the beauty). Errors: ConfigError where sizes differ or
-/// a layer is missing.
+/// Compares the colours of one layer ("" is the beauty). Errors: ConfigError if sizes differ or a
+/// layer is missing.
 PictureComparison compare_images(const Image& picture, const std::string& picture_name,
                                  const Image& reference, const std::string& reference_name,
                                  const std::string& layer);

@@ -1,8 +1,9 @@
 #ifndef HEDDLE_PIPELINE_SEALED_JSON_H_
 #define HEDDLE_PIPELINE_SEALED_JSON_H_
 // JSON files that hold a checksum of themselves: the XXH3-128 of all other entries, under "seal".
-// For what the program writes for itself and must not misread: a flipped bit in a number is still
-// JSON. Errors: FileError naming the file. Tested in tests/pipeline/artifact_record_test.cpp.
+// For files that the program writes for itself and must not misread: with a flipped bit in a number
+// they are still JSON. Errors: FileError naming the file. Tested in
+// tests/pipeline/artifact_record_test.cpp.
 
 #include <filesystem>
 #include <nlohmann/json.hpp>

@@ -1,11 +1,11 @@
 #ifndef HEDDLE_PIPELINE_WARNINGS_H_
 #define HEDDLE_PIPELINE_WARNINGS_H_
-// Where a method is out of its depth: what a user should know before trusting a picture or a pack.
-// Every limit below was read from a measured error curve (docs/stability.md; tests/stability holds
-// curve and limit against each other). `heddle check` says what is true of a pack whatever is
-// rendered from it; `render` and `run` say that and what is true of the picture, and put it into
-// the picture's report. A warning never changes a result or an exit status. Tested in
-// tests/pipeline/warnings_test.cpp.
+// Warnings of methods that are used beyond their limits: what a user should know before trusting a
+// picture or a pack. Every limit below was read from a measured error curve (docs/stability.md).
+// tests/stability compares curve and limit. `heddle check` reports what is true of a pack, whatever
+// is rendered from it. `render` and `run` report that and what is true of the picture, and put it
+// into the picture's report. A warning never changes a result or an exit status. Tested in
+// tests/stability/warnings_test.cpp.
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -25,7 +25,7 @@
 namespace heddle {
 
 struct Warning {
-  std::string subject;        // its row in docs/stability.md
+  std::string subject;        // its curve in docs/stability.md
   std::string what;           // the fact, with its place and figures
   double expected_error = 0;  // relative, of what `what` speaks of; from the curve
   std::string instead;        // what to do
@@ -44,8 +44,8 @@ inline constexpr double kCellMeanFreePaths = 6;
 // Transfer without cones: light that spreads by less than this at every scattering keeps shapes
 // that order 5 cannot hold.
 inline constexpr double kParallelDegrees = 7;
-// Sums of Gaussians alone (on data for light from the face, and from both sides), and signed
-// distances alone: the sharpness beyond which, and below which, each is out of range.
+// Sharpness above which sums of Gaussians alone are out of range, on data for light from the face
+// and from both sides. Sharpness below which signed distances alone are.
 inline constexpr double kLobesSharpness = 200;
 inline constexpr double kSphereLobesSharpness = 30;
 inline constexpr double kDistanceSharpness = 3;
@@ -78,9 +78,8 @@ struct PackFacts {
   double mean_free_path_mm = 0;
   // edge of as many cubes as there are cells; 0 without a transfer
   double cell_mean_free_paths = 0;
-  double neighbour_angle =
-      // radians: rms angle between the fibers within three mean free paths, median over segments
-      0;
+  // radians: rms angle between the fibers within three mean free paths, median over segments
+  double neighbour_angle = 0;
   // radians: the narrowest longitudinal lobe that carries a tenth of the light or more
   double lobe_width = 0;
 };
@@ -101,7 +100,7 @@ struct PictureSetup {
   bool interactive_surfaces = false;  // some cloth is a surface by its interactive method
 };
 
-/// Of the picture, before it is made, without those of its packs: from some hundred eye rays.
+/// Of the picture, before it is made and without those of its packs. From some hundred eye rays.
 std::vector<Warning> picture_warnings(const PictureSetup& setup);
 /// Of the picture that was made.
 std::vector<Warning> frame_warnings(const PictureSetup& setup, const FrameBuffers& frame);

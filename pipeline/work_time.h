@@ -1,7 +1,8 @@
 #ifndef HEDDLE_PIPELINE_WORK_TIME_H_
 #define HEDDLE_PIPELINE_WORK_TIME_H_
-// How long work took: wall-clock seconds, and core-seconds (processor time of all threads of this
-// process, so only what runs alone can be told apart). Tested in tests/pipeline/chart_test.cpp.
+// How long work took, in wall-clock seconds and in core-seconds. Core-seconds are processor time of
+// all threads of this process, so work that runs at the same time cannot be told apart. Tested in
+// tests/pipeline/chart_test.cpp.
 
 #include <chrono>
 

@@ -1,11 +1,11 @@
 #ifndef HEDDLE_PRECOMPUTE_SG_FIT_H_
 #define HEDDLE_PRECOMPUTE_SG_FIT_H_
-// Visibility maps -> sums of spherical Gaussians (Khungurn 2017, section 4.1; the fit itself:
-// fibers/math/sg_sum_fit.h).
+// Visibility maps -> sums of spherical Gaussians (Khungurn 2017, section 4.1). The fit itself is in
+// fibers/math/sg_sum_fit.h.
 //
-// The set of axes is turned about +z by a random angle per segment, which masks what all segments
-// would have in common. The angle is a whole number of columns of the map (2.8 degrees), so that
-// all segments share one table of the fit. Tested in tests/precompute/sg_fit_test.cpp.
+// The set of axes is turned about +z by a random angle per segment. That masks errors which all
+// segments would have in common. The angle is a whole number of columns of the map (2.8 degrees),
+// so that all segments share one table of the fit. Tested in tests/precompute/sg_fit_test.cpp.
 
 #include "fibers/baked/segment_visibility.h"
 #include "precompute/visibility_maps.h"

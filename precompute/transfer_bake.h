@@ -4,18 +4,21 @@
 // cloth.
 //
 // A path leaves a segment's origin (fibers/tracing/segment_origins.h) towards a uniform direction
-// w1; if it hits a fiber it scatters by BCSDF sampling until it leaves the cloth in direction w0,
-// and adds 4 pi * throughput * Y_j0(w0) * Y_j1(w1) to a[j0][j1] of the segment's cell. Light from
-// the face only: paths that leave with w0.z <= 0 are dropped. One path so serves every light
-// direction, where the estimator of Khungurn 2017, section 4.2 (w0 and w1 both uniform) serves one
-// and pays for narrow lobes with noise; tests/bench/transfer_estimators.cpp holds both. Within a
-// cell, segments are chosen by their openness, the share of the sky they see: the cell's matrix is
-// the mean over what an eye can see of the cell, not over all it holds. The paper's plain mean
-// mixes hidden segments in and darkens large cells. Paths come in batches, stratified over w1 and
-// over the cell's segments; the spread of the batch means gives the standard error, and a cell is
-// done when its error meets the target. Cells are independent and draw from (seed, cell, path), so
-// any range of cells can be baked alone, by any number of threads, with the same result. Tested in
-// tests/precompute/transfer_bake_test.cpp.
+// w1. If it hits a fiber, it scatters by BCSDF sampling until it leaves the cloth in direction w0.
+// Then it adds 4 pi * throughput * Y_j0(w0) * Y_j1(w1) to a[j0][j1] of the segment's cell. With
+// light from the face only, paths that leave with w0.z <= 0 are dropped. One path serves every
+// light direction. A path of the estimator of Khungurn 2017, section 4.2 (w0 and w1 both uniform)
+// serves one, and pays for narrow lobes with noise. tests/bench/transfer_estimators.cpp compares
+// both.
+//
+// Within a cell, segments are chosen by their openness, the share of the sky they see. The cell's
+// matrix is then the mean over what an eye can see of the cell, not over all it holds. The paper's
+// plain mean includes hidden segments and darkens large cells.
+//
+// Paths come in batches, stratified over w1 and over the cell's segments. The spread of the batch
+// means gives the standard error. A cell is done when its error meets the target. Cells are
+// independent and draw from (seed, cell, path). So any range of cells can be baked alone, by any
+// number of threads, with the same result. Tested in tests/precompute/transfer_bake_test.cpp.
 
 #include <cstdint>
 #include <optional>
@@ -48,13 +51,13 @@ struct TransferSettings {
 /// Reads the section [transfer]; both_sides and seed are the fabric's.
 TransferSettings read_transfer_settings(const TomlTable& section);
 
-/// Whether `Cones::kAuto` keeps cones apart: where some fiber scatters into a lobe narrower than 3
-/// degrees, and fibers lie within 4 degrees of their bundles (rms). Silk filaments do (2.7); in
+/// Whether `Cones::kAuto` keeps cones apart: some fiber scatters into a lobe narrower than 3
+/// degrees, and fibers lie within 4 degrees of their bundles (rms). Silk filaments do (2.7). In
 /// spun yarns (cotton 5.0, wool 7.6) wander widens light beyond what order 5 blurs, and cones
-/// change nothing there.
+/// change nothing.
 bool keeps_light_on_cones(const Exemplar& exemplar, std::span<const Vec3> bundle_tangent);
 
-/// Added to each segment's openness, so that hidden segments are only rarely, not never, chosen.
+/// Added to each segment's openness, so that hidden segments are chosen rarely but not never.
 inline constexpr float kLeastOpenness = 1e-3F;
 
 struct TransferChunk {
@@ -69,7 +72,7 @@ class TransferBaker {
  public:
   static constexpr int kBatch = 1024;  // paths per batch
 
-  /// All that is passed by reference must outlive the baker.
+  /// All arguments by reference must outlive the baker.
   TransferBaker(const TileScene& scene, std::span<const BcsdfTable> materials,
                 const SegmentOrigins& origins, const TransferSettings& settings,
                 const SegmentCells& cells);

@@ -16,9 +16,9 @@ namespace {
 constexpr int kN = VisibilityMaps::kResolution;
 constexpr std::size_t kCells = static_cast<std::size_t>(kN) * kN;
 
-// A piece of fiber is projected with its squared radius smaller by this share: far above the
-// rounding of the test below for pieces up to kFarthest radii away, so that a cell is never closed
-// whose ray would pass. The ring of cells left out is traced.
+// A piece of fiber is projected with its squared radius smaller by this share. That is far above
+// the rounding of the test below for pieces up to kFarthest radii away, so no cell is closed whose
+// ray would pass. The ring of cells left out is traced.
 constexpr float kRadiusMargin = 2e-3F;
 
 // Pieces farther away, in radii, subtend less than a cell: a ray each is cheaper.
@@ -169,8 +169,8 @@ class MapTracer {
         const float to_end = to_begin + along;
         const float skew = sine * moment_flat[c] + moment_up;
         // Nearest approach of the ray's line and the axis' line: at share s = numerator /
-        // denominator of the axis, at distance |skew| / sqrt(denominator), ahead of the origin
-        // where to_begin + s along > 0.
+        // denominator of the axis, at distance |skew| / sqrt(denominator). It is ahead of the
+        // origin if to_begin + s along > 0.
         const float denominator = axis_axis - along * along;
         const float numerator = to_begin * along - begin_axis;
         const int side = (skew * skew < square * denominator) & (numerator >= 0) &

@@ -1,19 +1,18 @@
 #ifndef HEDDLE_PRECOMPUTE_VISIBILITY_MAPS_H_
 #define HEDDLE_PRECOMPUTE_VISIBILITY_MAPS_H_
 // Which directions are open from the origin of each segment (fibers/tracing/segment_origins.h), on
-// the endless flat cloth: 128 x 128 lat-long cells, one ray through the centre of each, the
-// segment's own fiber ignored in every copy of the tile (Khungurn 2017, section 4.1, where the
-// origin is the midpoint of the axis).
+// the endless flat cloth. A map has 128 x 128 lat-long cells, with one ray through the centre of
+// each. The segment's own fiber is ignored in every copy of the tile. (Khungurn 2017, section 4.1,
+// where the origin is the midpoint of the axis.)
 //
-// Light from the face only: only the cells of the upper hemisphere are traced, the lower half
-// counts as closed. So it does in everything fitted to these maps, signed distances and Gaussians
-// alike.
+// With light from the face only, just the cells of the upper hemisphere are traced. The lower half
+// counts as closed, here and in the signed distances and Gaussians fitted to these maps.
 //
-// Rays are saved without changing the result: where a ray hits, the fiber around the hit is
-// projected onto the map, and all cells whose ray passes within its radius (less a margin for
-// rounding) are closed without a ray of their own. A map costs about one ray per open cell and one
-// per piece of fiber seen; a segment that sees nothing costs only the latter. A segment's map
-// depends on that segment alone, so it is the same for any range and number of threads. Tested in
+// Rays are saved without changing the result. Where a ray hits, the fiber around the hit is
+// projected onto the map. All cells whose ray passes within its radius, less a margin for rounding,
+// are closed without a ray of their own. A map costs about one ray per open cell and one per piece
+// of fiber seen. A segment that sees nothing costs only the latter. A segment's map depends on that
+// segment alone, so it is the same for any range and number of threads. Tested in
 // tests/precompute/visibility_maps_test.cpp.
 
 #include <cstddef>

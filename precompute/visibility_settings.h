@@ -1,8 +1,8 @@
 #ifndef HEDDLE_PRECOMPUTE_VISIBILITY_SETTINGS_H_
 #define HEDDLE_PRECOMPUTE_VISIBILITY_SETTINGS_H_
-// What a fabric's section [visibility] says: how segment visibility is compressed. Keys, ranges and
-// defaults: configs/README.md. The resolution of the maps is fixed (VisibilityMaps::kResolution).
-// Tested in tests/precompute/visibility_settings_test.cpp.
+// A fabric's section [visibility]: how segment visibility is compressed. Keys, ranges and defaults:
+// configs/README.md. The resolution of the maps is fixed (VisibilityMaps::kResolution). Tested in
+// tests/precompute/visibility_settings_test.cpp.
 
 #include <cstdint>
 
@@ -20,8 +20,8 @@ struct VisibilitySettings {
   std::uint64_t seed = 1;
 };
 
-/// Reads the section [visibility]; both_sides is the fabric's, and so is the seed, which the caller
-/// sets. Axes that cover the upper hemisphere only are an error where light comes from both sides.
+/// Reads the section [visibility]. both_sides is the fabric's, and so is the seed, which the caller
+/// sets. Axes of the upper hemisphere only are an error with light from both sides.
 VisibilitySettings read_visibility_settings(const TomlTable& section, bool both_sides);
 
 }  // namespace heddle

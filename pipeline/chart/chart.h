@@ -2,7 +2,7 @@
 #define HEDDLE_PIPELINE_CHART_CHART_H_
 // Speed against accuracy: what every run of a table cost, and how far its picture is from a
 // path-traced reference. Runs go one after the other in one process, so that all have the same
-// machine and threads. Everything written is explained in docs/chart.md; its JSON follows
+// machine and threads. docs/chart.md explains everything that is written. The JSON follows
 // docs/chart-schema.json. Tested in tests/pipeline/chart_test.cpp.
 
 #include <filesystem>
@@ -84,8 +84,8 @@ struct CostAndError {
   double cost = 0;
   double error = 0;
 };
-/// Is the point on the Pareto front: does no other cost no more and err no more, one of them less?
-/// Points that are not finite are never on it.
+/// Is the point on the Pareto front? Then no other has at most its cost and at most its error, one
+/// of them less. Points that are not finite are never on it.
 std::vector<bool> pareto_front(std::span<const CostAndError> points);
 
 /// Fills front_render and front_total of all rows that are done.

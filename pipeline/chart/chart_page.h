@@ -1,9 +1,9 @@
 #ifndef HEDDLE_PIPELINE_CHART_CHART_PAGE_H_
 #define HEDDLE_PIPELINE_CHART_CHART_PAGE_H_
-// A chart for people: an SVG with two log-log panels (error over the time to render, and over that
-// time with the precomputation counted), and a page that holds it with the pictures of all its
-// points. Both stand alone: no script, font or file from elsewhere. Tested in
-// tests/pipeline/chart_test.cpp, which opens the page in Chromium.
+// A chart for people. The SVG has two log-log panels: error over the time to render, and over that
+// time with the precomputation. The page holds it with the pictures of all its points. Both stand
+// alone: no script, font or file from elsewhere. Tested in tests/pipeline/chart_test.cpp, which
+// opens the page in Chromium.
 
 #include <filesystem>
 #include <string>

@@ -63,8 +63,8 @@ bool is_space(char c) {
   return c == ' ' || c == '\t' || c == '\r' || c == '\n';
 }
 
-// Cuts the line into the fields of its object without interpreting the values, so that an id can be
-// echoed as it was written and an error can name its field. Whether each value is valid JSON shows
+// Cuts the line into the fields of its object without interpreting the values. So an id can be
+// echoed as it was written, and an error can name its field. Whether each value is valid JSON shows
 // when it is parsed.
 class FieldScanner {
  public:
@@ -266,8 +266,8 @@ Answer answer_line(const std::string& line) {
   }
 }
 
-// The next line; of one that is too long, only what shows that it is. False at the end of the
-// stream.
+// The next line. Of a line that is too long it holds only enough to show that. False at the end of
+// the stream.
 bool read_line(std::istream& in, std::string& line) {
   constexpr int kEnd = std::char_traits<char>::eof();
   line.clear();

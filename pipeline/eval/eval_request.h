@@ -1,6 +1,6 @@
 #ifndef HEDDLE_PIPELINE_EVAL_EVAL_REQUEST_H_
 #define HEDDLE_PIPELINE_EVAL_EVAL_REQUEST_H_
-// Strict access to the fields of one JSON object: every error names its field, a field that nobody
+// Strict access to the fields of one JSON object. Every error names its field. A field that nobody
 // asked for is an error. Ranges are those of docs/eval.md. Tested in tests/pipeline/eval_test.cpp.
 
 #include <initializer_list>

@@ -18,8 +18,8 @@ constexpr std::size_t kMaxResolution = 256;
 constexpr std::size_t kMaxCellsTimesGaussians = std::size_t{1} << 24;
 constexpr std::size_t kMaxCellsTimesDirections = std::size_t{1} << 22;
 
-// A Gaussian this sharp is 1e-6 wide: beyond, the integral over the map only changes nearer than
-// that to an edge.
+// A Gaussian this sharp is 1e-6 wide. If it is sharper, the integral over the map changes only
+// within that distance of an edge.
 constexpr double kSharpest = 1e12;
 
 SphericalMap read_map(EvalObject& request) {
@@ -99,8 +99,8 @@ SgSumShape read_shape(EvalObject& request, const SphericalMap& map) {
 }
 
 // Integral of the Gaussian over part of a cell: polar angles and azimuths from `begin` to `end`.
-// Halved until the parts are half a Gaussian's width, where five points per axis are exact to
-// 1e-10; parts 9 widths away hold less than 1e-17.
+// Halved until the parts are half a Gaussian's width. Five points per axis are then exact to 1e-10.
+// Parts 9 widths away hold less than 1e-17.
 double integrate(const SphericalGaussian& gaussian, double polar_begin, double polar_end,
                  double azimuth_begin, double azimuth_end) {
   const double width = 1 / std::sqrt(std::max(gaussian.sharpness, 1.0));
