@@ -77,7 +77,8 @@ bool publish_artifact(const fs::path& artifact, const fs::path& record_file,
   const ArtifactCheck meanwhile = check_artifact(artifact, record_file);
   if (meanwhile.state == ArtifactState::kSound) return built;
   if (!built)
-    throw FileError(fmt::format("{}: vanished while it was waited for", artifact.string()));
+    throw FileError(
+        fmt::format("{}: vanished while this process waited for it", artifact.string()));
   std::error_code error;
   if (fs::is_directory(record_file)) fs::remove_all(record_file, error);
   write_sealed_json(record_file, record_json(seals_of(temporary.path()), cost));

@@ -64,8 +64,7 @@ int render_within(double tolerance, const RenderOptions& options, Job& job) {
   if (by_hand) {
     throw ConfigError(
         "--tolerance chooses method, samples and data: not together with --method, --spp, "
-        "--seconds, --local, "
-        "--bounces, --estimator or --order");
+        "--seconds, --local, --bounces, --estimator or --order");
   }
   const ScenePlan plan = make_plan({.scene = options.scene,
                                     .view = options.view,
@@ -94,8 +93,8 @@ int render_within(double tolerance, const RenderOptions& options, Job& job) {
   const double noise = std::sqrt(noise_square.value / spp);
   const double error = std::hypot(std::sqrt(std::max(0.0, way.candidate.bias_square.value)), noise);
   const std::string done = fmt::format(
-      "{}, {} spp in {:.3g} s: expected error {:.3g} %, of that noise {:.3g} %, as the picture "
-      "shows",
+      "{}, {} spp in {:.3g} s: expected error {:.3g} %, of which noise {:.3g} % (measured in the "
+      "picture)",
       way.candidate.name, spp, picture.report.at("seconds").get<double>(), 100 * error,
       100 * noise);
   if (error > tolerance) {
@@ -118,7 +117,7 @@ int render_command(const RenderOptions& options, const CommonOptions& common) {
   if (options.output.extension() != ".exr")
     throw ConfigError("-o: expected a file name that ends in .exr");
   Job job(common);
-  // Hours of work later would be late to find out.
+  // Found out now, not after hours of work.
   make_folder(options.output.parent_path());
   for (const char* extension : {".exr", ".png", ".json"}) {
     require_writable(std::filesystem::path(options.output).replace_extension(extension));

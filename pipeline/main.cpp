@@ -68,7 +68,7 @@ struct Options {
 };
 
 void add_common(CLI::App& command, Options& options) {
-  command.add_option("-j,--threads,--nthreads", options.threads, "Threads; all cores where absent")
+  command.add_option("-j,--threads,--nthreads", options.threads, "Threads; all cores by default")
       ->check(CLI::Range(1, 4096));
   command.add_flag("-q,--quiet", options.common.quiet, "No messages but warnings and errors");
   command.add_flag("--json", options.common.json, "A report for programs on standard output");
@@ -77,7 +77,7 @@ void add_common(CLI::App& command, Options& options) {
 void add_building(CLI::App& command, Options& options) {
   add_common(command, options);
   command.add_option("--cache", options.common.cache,
-                     "Folder of the artifacts; $HEDDLE_CACHE or out/cache where absent");
+                     "Folder of the artifacts; by default $HEDDLE_CACHE, else out/cache");
   command.add_option("--seed", options.common.seed, "In place of the seed that the config states");
 }
 
@@ -92,7 +92,8 @@ CLI::Option* add_tolerance(CLI::App& command, int& pictures, const std::string& 
   command
       .add_option(
           "--pictures", pictures,
-          "With --tolerance: pictures that share the data, frames of a shot; 1 where absent")
+          "With --tolerance: how many pictures share the data, such as the frames of a shot; "
+          "1 by default")
       ->check(CLI::Range(1, 1 << 20));
   return command.add_option("--tolerance", tolerance, help)->check(CLI::Range(1e-6, 100.0));
 }
@@ -116,33 +117,30 @@ void add_stage_command(CLI::App& app, Options& options, const std::string& name,
   command->callback([&options, target] { options.stage.target = target; });
 }
 
-/// What is left of a command's work when a signal ends it, as a sentence for users.
+/// What a signal leaves of a command's work, as a sentence for users.
 const char* kept_after_signal(const std::string& command) {
   constexpr char kStages[] =
       "finished stages and chunks are kept in the cache, and the same command goes on from them";
   constexpr char kMeasurement[] =
-      "nothing of the measurement is kept; finished stages and chunks are, in the cache";
+      "the measurement is lost; finished stages and chunks are kept in the cache";
   constexpr char kNothing[] = "nothing was written";
   static const std::map<std::string, const char*> kept = {
       {"accuracy", kMeasurement},
       {"chart",
        "finished pictures are kept in the chart's folder runs, and the same command with --resume "
-       "goes on from them; "
-       "finished stages and chunks are kept in the cache"},
+       "goes on from them; finished stages and chunks are kept in the cache"},
       {"check", kNothing},
       {"compare", kNothing},
-      {"eval", "the answers printed so far hold"},
+      {"eval", "the answers printed so far are complete"},
       {"info", kNothing},
       {"pack", kStages},
       {"plan", kMeasurement},
       {"precompute", kStages},
       {"render",
-       "nothing of the picture is kept; finished stages and chunks of its fabrics are, in the "
-       "cache"},
+       "the picture is lost; finished stages and chunks of its fabrics are kept in the cache"},
       {"run",
        "finished pictures, stages and chunks are kept in the cache, and the same command goes on "
-       "from them; nothing "
-       "is kept of a picture that was being rendered"},
+       "from them; a picture that was being rendered is lost"},
       {"synth", kStages},
       {"transfer", kStages},
       {"visibility", kStages},
@@ -154,12 +152,12 @@ const char* kept_after_signal(const std::string& command) {
 std::map<std::string, std::function<int()>> add_commands(CLI::App& app, Options& options) {
   std::map<std::string, std::function<int()>> actions;
 
-  CLI::App* run =
-      app.add_subcommand("run", "Build everything a scene lacks, then its pictures: the main job");
+  CLI::App* run = app.add_subcommand(
+      "run", "Build everything that a scene lacks, then render its pictures: the main job");
   add_building(*run, options);
   run->add_option("SCENE.toml", options.run.scene, "Scene config")->required();
   run->add_option("-o,--output,--outfile", options.run.output,
-                  "Folder of the pictures; out/NAME where absent");
+                  "Folder of the pictures; out/NAME by default");
   add_order(*run, options.run.order);
   actions["run"] = [&options] { return run_command(options.run, options.common); };
 
@@ -173,7 +171,7 @@ std::map<std::string, std::function<int()>> add_commands(CLI::App& app, Options&
   add_stage_command(app, options, "pack", "The folder that a renderer opens", StageTarget::kPack,
                     false);
   add_stage_command(app, options, "accuracy",
-                    "What the methods are worth on a fabric: the table that plans are made from",
+                    "Errors and times of the methods on a fabric: the table behind plans",
                     StageTarget::kAccuracy, false);
   for (const char* name : {"precompute", "synth", "visibility", "transfer", "pack", "accuracy"}) {
     actions[name] = [&options] {
@@ -191,13 +189,12 @@ std::map<std::string, std::function<int()>> add_commands(CLI::App& app, Options&
                    "The .exr file; a .png and a .json go beside it")
       ->required();
   render->add_option("--view", picture.view,
-                     "Name of one of the scene's [[view]] tables; its [camera] where absent");
+                     "Name of one of the scene's [[view]] tables; its [camera] by default");
   render->add_option("--method", picture.method, "In place of the scene's")
       ->check(CLI::IsMember(method_names()));
   render->add_option("--spp", picture.spp, "Samples per pixel, in place of the scene's")
       ->check(CLI::Range(1, 1 << 24));
-  render
-      ->add_option("--seconds", picture.seconds, "Path tracer: go on until this much time is spent")
+  render->add_option("--seconds", picture.seconds, "Path tracer: render for this many seconds")
       ->check(CLI::PositiveNumber);
   render
       ->add_option("--crop,--cropwindow", picture.crop, "x0,y0,x1,y1 in pixels, x1 and y1 excluded")
@@ -206,14 +203,14 @@ std::map<std::string, std::function<int()>> add_commands(CLI::App& app, Options&
   render->add_flag("--local", picture.local, "Path tracer: paths that leave the cloth's shell end");
   render
       ->add_option("--bounces", picture.bounces,
-                   "Path tracer: scattering events, no limit where absent")
+                   "Path tracer: most scattering events; no limit by default")
       ->check(CLI::Range(1, 4096));
   render->add_option("--estimator", picture.estimator, "Path tracer: how lights are sampled")
       ->check(CLI::IsMember({"mis", "light", "bcsdf"}));
   add_order(*render, picture.order);
   add_tolerance(
       *render, picture.pictures,
-      "Relative RMSE per pixel, noise included: method, samples and data are chosen by a plan",
+      "Largest relative RMSE per pixel, noise included; a plan chooses method, samples and data",
       picture.tolerance);
   actions["render"] = [&options] { return render_command(options.render, options.common); };
 
@@ -231,12 +228,13 @@ std::map<std::string, std::function<int()>> add_commands(CLI::App& app, Options&
   compare->add_option("-o,--output,--outfile", pair.output,
                       "Difference picture: an .exr, and a .png beside it");
   compare->add_option("--layer", pair.layer,
-                      "Layer to compare, such as single; the beauty where absent");
-  compare->add_option("--max-rmse", pair.max_rmse, "Status 1 where the relative RMSE is larger")
+                      "Layer to compare, such as single; the beauty by default");
+  compare
+      ->add_option("--max-rmse", pair.max_rmse, "Exit with status 1 if the relative RMSE is larger")
       ->check(CLI::NonNegativeNumber);
   compare
       ->add_option("--max-mean", pair.max_mean,
-                   "Status 1 where the mean colour is off by a larger share")
+                   "Exit with status 1 if the mean colour is off by a larger share")
       ->check(CLI::NonNegativeNumber);
   actions["compare"] = [&options] { return compare_command(options.compare, options.common); };
 
@@ -245,10 +243,11 @@ std::map<std::string, std::function<int()>> add_commands(CLI::App& app, Options&
   add_building(*plan, options);
   plan->add_option("SCENE.toml", options.plan.scene, "Scene config")->required();
   add_tolerance(*plan, options.plan.pictures,
-                "Relative RMSE per pixel, noise included: 0.05 is 5 %", options.plan.tolerance)
+                "Largest relative RMSE per pixel, noise included: 0.05 is 5 %",
+                options.plan.tolerance)
       ->required();
   plan->add_option("--view", options.plan.view,
-                   "Name of one of the scene's [[view]] tables; its [camera] where absent");
+                   "Name of one of the scene's [[view]] tables; its [camera] by default");
   plan->add_option("--crop,--cropwindow", options.plan.crop,
                    "x0,y0,x1,y1 in pixels, x1 and y1 excluded")
       ->delimiter(',')
@@ -262,27 +261,27 @@ std::map<std::string, std::function<int()>> add_commands(CLI::App& app, Options&
   chart->add_option("SCENE.toml", asked.scene, "Scene config")->required();
   chart->add_option("-o,--output,--outfile", asked.output, "Folder of the chart")->required();
   chart->add_option("--view", asked.view,
-                    "Name of one of the scene's [[view]] tables; its [camera] where absent");
+                    "Name of one of the scene's [[view]] tables; its [camera] by default");
   chart
       ->add_option("--width", asked.width,
-                   "Pixels; 96 where neither width nor height nor crop is given")
+                   "Pixels; 96 if neither width nor height nor crop is given")
       ->check(CLI::Range(1, 16384));
-  chart->add_option("--height", asked.height, "Pixels; by the view's shape where absent")
+  chart->add_option("--height", asked.height, "Pixels; by default from the view's shape")
       ->check(CLI::Range(1, 16384));
   chart->add_option("--crop,--cropwindow", asked.crop, "x0,y0,x1,y1 in pixels, x1 and y1 excluded")
       ->delimiter(',')
       ->expected(4);
   chart
       ->add_option("--reference-spp", asked.reference_spp,
-                   "Samples per pixel of the two references, 1024 where absent")
+                   "Samples per pixel of the two references, by default 1024")
       ->check(CLI::Range(2, 1 << 24));
   chart
       ->add_option("--methods", asked.methods,
-                   "Only runs of these methods, separated by commas; all where absent")
+                   "Only runs of these methods, separated by commas; all by default")
       ->delimiter(',')
       ->check(CLI::IsMember(method_names()));
   chart->add_flag("--quick", asked.quick,
-                  "Few settings per method: a look, or a check that all of it works");
+                  "Few settings per method: for a first look, or to check that everything works");
   chart->add_flag("--resume", asked.resume,
                   "Keep what an earlier chart in the same folder has rendered and timed");
   actions["chart"] = [&options] { return chart_command(options.chart, options.common); };
@@ -351,8 +350,7 @@ ProgramEnd run_program(int argc, char** argv) {
   } catch (const std::bad_alloc&) {
     return {kFailed, "memory ran out, " + memory_text(available_memory()) +
                          " are available now: a smaller picture or crop, fewer repeats of the "
-                         "weave or fewer fibers "
-                         "need less"};
+                         "weave or fewer fibers need less"};
   } catch (const std::exception& error) {
     return {kFailed, error.what()};
   }

@@ -19,7 +19,7 @@ namespace {
 // Rays of pack_facts: the mean free path is good to 2 %.
 constexpr int kFactSamples = 5000;
 
-// How far light gets in the few scatterings after which it has mostly left or gone dark.
+// How far light gets in a few scatterings. After them it has mostly left or gone dark.
 constexpr double kNeighbourMeanFreePaths = 3;
 
 // Eye rays of picture_warnings, at most, along the longer side of the picture.
@@ -49,7 +49,7 @@ std::map<std::array<int, 3>, std::vector<std::uint32_t>> cubes_of(const Exemplar
   return cubes;
 }
 
-/// Edge of cubes of which `count` hold segments.
+/// Edge of cubes such that `count` of them hold segments.
 double edge_of_cubes(const Exemplar& exemplar, std::size_t count, double shortest) {
   double low = shortest;
   double high = std::max<double>({exemplar.width_mm, exemplar.height_mm, 2 * shortest});
@@ -188,15 +188,16 @@ void add_light_warnings(const PictureSetup& setup, std::vector<Warning>& warning
       warnings.push_back(
           {"sum-of-gaussians",
            fmt::format(
-               "{}, and sums of Gaussians, which leak light from sharpness {:g} on, serve it alone",
+               "{}, and only sums of Gaussians serve it, which leak light from sharpness {:g} on",
                name, lobes_limit),
            0.3, "Let signed distances serve it (visibility blend 10 to 20)"});
     }
     if (setup.blend.uses_distance(light.sharpness) && sharpness < kDistanceSharpness) {
       warnings.push_back(
           {"signed-distance",
-           fmt::format("{}, and signed distances, which know one edge only, serve it below {:g}",
-                       name, kDistanceSharpness),
+           fmt::format(
+               "{}, and signed distances serve it, which know one edge only and fail below {:g}",
+               name, kDistanceSharpness),
            0.4, "Let sums of Gaussians serve it (visibility blend 10 to 20)"});
     }
     if (setup.method == RenderMethod::kPrinted && sharpness < kPrintedGammaSharpness) {
@@ -279,7 +280,7 @@ std::vector<Warning> pack_warnings(const FabricPack& pack, const TileScene& tile
     warnings.push_back({"truncation",
                         fmt::format("{}: neighbouring fibers lie within {:.1f} degrees of each "
                                     "other and scatter into lobes of {:.1f} "
-                                    "degrees; light stays narrower than harmonics of order {} hold",
+                                    "degrees; harmonics of order {} cannot hold light that narrow",
                                     pack.name, degrees(facts.neighbour_angle),
                                     degrees(facts.lobe_width), pack.transfer->order),
                         0.25, "cones = \"on\" in [transfer], or --method path"});
@@ -319,7 +320,7 @@ std::vector<Warning> picture_warnings(const PictureSetup& setup) {
       warnings.push_back({"behind",
                           fmt::format("{} reaches {} of the cloth in the picture from behind, and "
                                       "the data hold light from the face "
-                                      "only: what shines through is missing",
+                                      "only: light that shines through is missing",
                                       name, percent(share(probe.behind[l]))),
                           1,
                           "light_from = \"both\" in the fabric, an underlay where nothing should "
@@ -329,19 +330,18 @@ std::vector<Warning> picture_warnings(const PictureSetup& setup) {
       warnings.push_back({"behind",
                           fmt::format("{} lies within {:g} degrees of the plane of {} of the cloth "
                                       "in the picture, whose data hold light "
-                                      "from both sides: harmonics see it from both",
+                                      "from both sides: harmonics see it on both sides",
                                       name, kPlaneDegrees, percent(share(probe.in_plane[l]))),
                           0.15, "light_from = \"face\", or --method path"});
     }
   }
   const double pixel = median(probe.pixel_radii);
   if (pixel < kPixelRadii) {
-    warnings.push_back(
-        {"zoom",
-         fmt::format(
-             "a pixel is {:.2g} radii of a fiber wide: a segment has one visibility, and it shows",
-             pixel),
-         0.35, "--method path"});
+    warnings.push_back({"zoom",
+                        fmt::format("a pixel is {:.2g} radii of a fiber wide: one sees that a "
+                                    "segment has a single visibility",
+                                    pixel),
+                        0.35, "--method path"});
   }
   if (share(probe.grazing) > 0.5) {
     warnings.push_back(

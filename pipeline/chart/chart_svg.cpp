@@ -319,7 +319,8 @@ class ChartDrawing {
                      6;
     const ChartReference& reference = chart_.references[kind_];
     std::string note = fmt::format(
-        "Yellow: Pareto front. Bars: 95 % intervals. Hollow: not told from no error. Reference: {} "
+        "Yellow: Pareto front. Bars: 95 % intervals. Hollow: cannot be told from no error. "
+        "Reference: {} "
         "spp in two halves "
         "(its noise, "
         "{:.2g} %, does not count). {} threads.",
