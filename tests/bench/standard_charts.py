@@ -386,8 +386,10 @@ def main():
         with open(f"{options.output}/{name}.json", "w") as file:
             json.dump(document, file, indent=1)
             file.write("\n")
-    page = ["# Standard charts", "", "Made by `python3 tests/bench/standard_charts.py`, which says what each is. Each JSON holds the figures with the command, key, "
-            "seed, seconds and program version behind them. 0 % means: not told from none (the reference's noise outweighs the error); bars are 95 % intervals.", ""]
+    page = ["# Standard charts", "",
+            "`python3 tests/bench/standard_charts.py` makes these charts, and its first lines say what each is. Each JSON holds the",
+            "figures with the command, key, seed, seconds and program version behind them. Bars are 95 % intervals. 0 % means that",
+            "the error cannot be told from none, because the reference's noise outweighs it.", ""]
     for name, (title, _) in CHARTS.items():
         path = f"{options.output}/{name}.json"
         if not os.path.exists(path):
