@@ -23,7 +23,7 @@ struct FileSeal {
 };
 /// Errors: FileError.
 FileSeal seal_of_file(const std::filesystem::path& path);
-/// Reads the whole file. Errors: FileError where it is absent or differs; `source` is the file that
+/// Reads the whole file. Errors: FileError if it is absent or differs. `source` is the file that
 /// states the seal.
 void verify_seal(const std::filesystem::path& path, const FileSeal& seal,
                  const std::string& source);

@@ -19,7 +19,7 @@ std::uint64_t difference(std::uint64_t limit, std::uint64_t used) {
   return limit > used ? limit - used : 0;
 }
 
-/// The first number of a file; empty where there is none (cgroup files may hold "max").
+/// The first number of a file; empty if there is none (cgroup files may hold "max").
 std::optional<std::uint64_t> number_in(const std::string& path) {
   std::ifstream file(path);
   std::uint64_t number = 0;

@@ -17,7 +17,7 @@ namespace {
 constexpr std::size_t kMaxTriangles = 50'000'000;
 constexpr std::int64_t kAbsent = -1;
 
-/// Indices of one corner from 0, kAbsent where not given.
+/// Indices of one corner from 0, kAbsent if not given.
 struct Corner {
   std::int64_t position = kAbsent;
   std::int64_t uv = kAbsent;

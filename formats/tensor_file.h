@@ -70,7 +70,7 @@ class TensorFile {
 
   const std::map<std::string, Entry>& entries() const { return entries_; }
   const std::map<std::string, std::string>& metadata() const { return metadata_; }
-  /// Metadata value; FileError naming file and key where it is absent.
+  /// Metadata value; FileError naming file and key if it is absent.
   const std::string& metadata_value(const std::string& key) const;
   const std::filesystem::path& path() const { return path_; }
 
@@ -83,7 +83,7 @@ class TensorFile {
     copy_bytes(values.data(), bytes);
     return values;
   }
-  /// Shape of a tensor; FileError where it is absent.
+  /// Shape of a tensor; FileError if it is absent.
   const std::vector<std::uint64_t>& shape(const std::string& name) const;
 
  private:

@@ -88,7 +88,7 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
   return d[a.size()][b.size()];
 }
 
-/// The candidate that `word` is most likely a misspelling of; empty where none is close.
+/// The candidate for which `word` is most likely a misspelling; empty if none is close.
 template <class Range>
 std::string nearest(std::string_view word, const Range& candidates) {
   if (word.size() > 64) return {};
@@ -125,8 +125,8 @@ std::string shortened(std::string_view text) {
   return std::string(text.substr(0, end)) + "...";
 }
 
-/// The source line (in part, where it is long) and a caret under the column, which counts code
-/// points from 1.
+/// The source line and a caret under the column, which counts code points from 1. Of a long line
+/// only a part.
 std::string excerpt(std::string_view line, std::size_t column) {
   constexpr std::size_t kWidth = 120;
   // of these to the left of the caret, where the beginning is left out
@@ -154,7 +154,7 @@ class DepthScan {
  public:
   explicit DepthScan(std::string_view text) : text_(text) {}
 
-  /// The place of the dot or bracket that goes too deep; nothing where none does.
+  /// The place of the dot or bracket that goes too deep; nothing if none does.
   std::optional<toml::source_position> first_too_deep() {
     for (std::size_t next = 0; at_ < text_.size(); at_ = next) {
       next = at_ + token_length();
@@ -241,7 +241,7 @@ class DepthScan {
 
   toml::source_position position() const {
     const std::string_view before = text_.substr(0, at_);
-    const std::size_t line_begin = before.rfind('\n') + 1;  // 0 where there is no line before
+    const std::size_t line_begin = before.rfind('\n') + 1;  // 0 if there is no line before
     const auto code_points =
         std::count_if(before.begin() + static_cast<std::ptrdiff_t>(line_begin), before.end(),
                       [](char c) { return !continues_code_point(c); });

@@ -34,8 +34,8 @@ struct AskedKey {
   // number, integer, boolean, string, file, number[2], number[3], number[], table,
   std::string type;
   // table[]
-  std::string range;          // "" where none; strings with a fixed set of choices: "face | both"
-  std::string default_value;  // "required" where there is none; "optional" for optional_* keys
+  std::string range;          // "" if none; strings with a fixed set of choices: "face | both"
+  std::string default_value;  // "required" if there is none; "optional" for optional_* keys
 };
 
 /// A table of a TOML document. Cheap to copy: tables of one document share it. Not for use by
@@ -69,7 +69,7 @@ class TomlTable {
   /// A string taken as a path relative to the folder of the document. The file must exist.
   std::filesystem::path existing_file(std::string_view key) const;
 
-  /// A required sub-table / an optional one / an array of tables ([[key]]; empty where absent).
+  /// A required sub-table / an optional one / an array of tables ([[key]]; empty if absent).
   TomlTable table(std::string_view key) const;
   std::optional<TomlTable> optional_table(std::string_view key) const;
   std::vector<TomlTable> tables(std::string_view key) const;

@@ -13,8 +13,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A picture from the cache, rendered where it is not there, and copied to `target` (with its .png
-/// and .json).
+/// A picture from the cache, rendered if it is not there, and copied to `target` with its .png and
+/// .json.
 void provide_picture(SceneJob& scene, const PictureRequest& request, const fs::path& target,
                      Job& job) {
   const std::string title = target.stem().string();

@@ -92,9 +92,9 @@ struct ChartOptions {
   // px; 96 or less where neither is given, the other by the view's shape
   std::optional<int> width;
   std::optional<int> height;
-  // x0, y0, x1, y1, or empty; of the view's own frame where no width or height is given
+  // x0, y0, x1, y1, or empty; of the view's own frame if no width or height is given
   std::vector<int> crop;
-  std::vector<std::string> methods;  // of the runs; all where empty
+  std::vector<std::string> methods;  // of the runs; all if empty
   int reference_spp = 1024;
   bool quick = false;
   bool resume = false;

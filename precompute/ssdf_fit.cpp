@@ -31,7 +31,7 @@ constexpr double kSmallestComponent = 1e-5;
 // [segment][cell]
 using Samples = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-/// Segments that see something, `count` of them at random; all where there are no more. Ascending.
+/// Segments that see something, `count` of them at random; all if there are no more. Ascending.
 std::vector<std::uint32_t> choose_segments(const VisibilityMaps& maps, std::size_t count,
                                            std::uint64_t seed) {
   std::vector<std::pair<std::uint64_t, std::uint32_t>> drawn;

@@ -47,7 +47,7 @@ struct ConeTransfer {
   std::vector<float> harmonics;
   std::vector<float> moments;  // [cell][width][j0][azimuth][rgb]
 
-  /// The class of a path by the variance it predicts (square radians); kWidths where it is too
+  /// The class of a path by the variance that it predicts (square radians); kWidths if that is too
   /// wide.
   static int width_of(float variance) {
     int width = 0;

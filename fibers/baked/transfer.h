@@ -55,7 +55,7 @@ Transfer read_transfer(const std::filesystem::path& path);
 /// chunk of one.
 void add_cones(TensorFileWriter& file, const ConeTransfer& cones, std::uint64_t cells,
                std::uint64_t coefficients);
-/// Nothing where the file holds none.
+/// Nothing if the file holds none.
 std::optional<ConeTransfer> get_cones(const TensorFile& file, std::uint64_t cells,
                                       std::uint64_t coefficients);
 

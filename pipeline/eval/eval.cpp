@@ -204,7 +204,7 @@ Json evaluate(const Json& request) {
   throw EvalError("field \"quantity\": unknown quantity \"" + name + "\"; known: " + known);
 }
 
-// {"id":…,"key":payload}, both already JSON; no id where it is empty.
+// {"id":…,"key":payload}, both already JSON; no id if it is empty.
 std::string answer_text(const std::string& id, const char* key, const std::string& payload) {
   std::string text = "{";
   if (!id.empty()) text.append("\"id\":").append(id).append(",");
