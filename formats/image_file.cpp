@@ -384,6 +384,20 @@ Image read_exr(const std::filesystem::path& path) {
   }
 }
 
+PngHeader read_png_header(const std::filesystem::path& path) {
+  const std::vector<std::byte> bytes = read_whole_file(path);
+  png_image image{};
+  image.version = PNG_IMAGE_VERSION;
+  if (png_image_begin_read_from_memory(&image, bytes.data(), bytes.size()) == 0) {
+    throw FileError(
+        fmt::format("{}: cannot read as a PNG image: {}", path.string(), image.message));
+  }
+  const PngHeader header = {static_cast<int>(image.width), static_cast<int>(image.height),
+                            static_cast<int>(PNG_IMAGE_SAMPLE_CHANNELS(image.format))};
+  png_image_free(&image);
+  return header;
+}
+
 void write_png(const std::filesystem::path& path, int width, int height,
                const std::vector<std::uint8_t>& rgb) {
   assert(width > 0 && height > 0);

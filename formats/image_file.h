@@ -34,6 +34,14 @@ void write_exr(const std::filesystem::path& path, const Image& image);
 /// deep and multi-part.
 Image read_exr(const std::filesystem::path& path);
 
+/// What the first bytes of a PNG file say.
+struct PngHeader {
+  int width = 0;
+  int height = 0;
+  int channels = 0;  // 1 grey, 2 grey and alpha, 3 RGB (or a palette), 4 RGB and alpha
+};
+PngHeader read_png_header(const std::filesystem::path& path);
+
 /// [height][width][3] bytes, written atomically.
 void write_png(const std::filesystem::path& path, int width, int height,
                const std::vector<std::uint8_t>& rgb);

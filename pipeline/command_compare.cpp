@@ -2,6 +2,7 @@
 
 #include "formats/input_error.h"
 #include "pipeline/commands.h"
+#include "pipeline/console.h"
 #include "pipeline/picture_compare.h"
 
 namespace heddle {
@@ -28,6 +29,13 @@ int compare_command(const CompareOptions& options, const CommonOptions& common) 
     std::cout << comparison_report(comparison).dump(2) << '\n';
   } else {
     std::cout << comparison_text(comparison) << '\n';
+  }
+  if (!comparison.shared_seed.empty() && comparison.error.mean_square != 0) {
+    Console(std::cerr, false, common.quiet)
+        .warn(
+            "both pictures come from seed " + comparison.shared_seed +
+            " and share part of their noise: the error shown is that of this pair only. Render one "
+            "of them with another --seed.");
   }
   const PictureError& error = comparison.error;
   const bool rmse_beyond = options.max_rmse && error.relative_rmse > *options.max_rmse;

@@ -11,12 +11,15 @@
 #include "fibers/cloth/synthesize.h"
 #include "fibers/tracing/tile_scene.h"
 #include "formats/atomic_file.h"
+#include "formats/file_ending.h"
+#include "formats/hdr_file.h"
 #include "formats/id_volume_file.h"
 #include "formats/image_file.h"
 #include "formats/input_error.h"
 #include "formats/obj_mesh.h"
 #include "formats/tensor_file.h"
 #include "pipeline/commands.h"
+#include "pipeline/json_file.h"
 #include "pipeline/plan/accuracy_table.h"
 #include "pipeline/stages.h"
 #include "render/scene_config.h"
@@ -51,7 +54,7 @@ void describe_exemplar(const Exemplar& exemplar, std::uint64_t seed, Report& rep
 }
 
 Report describe_fabric(const fs::path& path, const CommonOptions& common) {
-  const FabricDocument fabric = read_fabric_document(path, common.seed);
+  const FabricDocument fabric = read_fabric_document(path, common.fabric_seed);
   Report report = {{"kind", "fabric config"},
                    {"name", fabric.config.name},
                    {"weave", fabric.config.weave.notation}};
@@ -115,7 +118,7 @@ Report describe_tensors(const fs::path& path, const CommonOptions& common) {
   }
   const auto kind = file.metadata().find("kind");
   if (kind != file.metadata().end() && kind->second == "fibers") {
-    describe_exemplar(read_exemplar(path), common.seed.value_or(1), report);
+    describe_exemplar(read_exemplar(path), common.fabric_seed.value_or(1), report);
   }
   return report;
 }
@@ -176,8 +179,7 @@ Report describe_vdb(const fs::path& path) {
   return report;
 }
 
-Report describe_image(const fs::path& path) {
-  const Image image = read_exr(path);
+Report describe_image(const Image& image) {
   Report report = {{"kind", "picture"}, {"resolution_px", {image.width, image.height}}};
   for (const auto& [key, value] : image.metadata) report["metadata." + key] = value;
   for (const auto& [name, channel] : image.channels) {
@@ -207,6 +209,62 @@ Report describe_image(const fs::path& path) {
   return report;
 }
 
+Report describe_png(const fs::path& path) {
+  const PngHeader header = read_png_header(path);
+  return {{"kind", "picture for the screen"},
+          {"resolution_px", {header.width, header.height}},
+          {"channels", header.channels}};
+}
+
+Report describe_chart(const nlohmann::json& chart) {
+  Report report = {
+      {"kind", "chart"},
+      {"scene", chart.at("scene").at("name")},
+      {"view", chart.at("scene").at("view")},
+      {"resolution_px", {chart.at("picture").at("width"), chart.at("picture").at("height")}},
+      {"program_version", chart.at("program_version")}};
+  for (const nlohmann::json& row : chart.at("rows")) {
+    const std::string name =
+        "run." + row.at("method").get<std::string>() + ", " + row.at("label").get<std::string>();
+    if (row.at("status") != "done") {
+      report[name] = "failed: " + row.at("message").get<std::string>();
+      continue;
+    }
+    report[name] = fmt::format("{:.3g} % in {:.3g} s of rendering",
+                               100 * row.at("error").at("full").at("relative_rmse").get<double>(),
+                               row.at("render_seconds").get<double>());
+  }
+  return report;
+}
+
+/// An object of ours whose entries say enough by themselves: the report of a picture, of a plan, or
+/// the record of an artifact.
+Report describe_entries(const char* kind, const nlohmann::json& object) {
+  Report report = {{"kind", kind}};
+  for (const auto& [name, value] : object.items()) report[name] = value;
+  return report;
+}
+
+/// Errors: FileError for JSON that none of our commands writes.
+Report describe_json(const fs::path& path) {
+  const nlohmann::json json = read_json(path);
+  try {
+    if (json.is_object()) {
+      const std::string format = json.value("format", "");
+      if (format == "heddle chart") return describe_chart(json);
+      if (format == "heddle plan") return describe_entries("plan", json);
+      if (json.contains("heddle.method")) return describe_entries("report of a picture", json);
+      if (json.contains("seal")) return describe_entries("record of an artifact", json);
+    }
+  } catch (const nlohmann::json::exception& error) {
+    throw FileError(fmt::format("{}: {}", path.string(), error.what()));
+  }
+  throw FileError(
+      path.string() +
+      ": expected a chart, the report of a picture or of a plan, an accuracy table, the "
+      "record of an artifact, or a pack's manifest");
+}
+
 Report describe_mesh(const fs::path& path) {
   const ObjMesh mesh = read_obj(path);
   std::array<float, 3> low{};
@@ -232,20 +290,30 @@ Report describe(const fs::path& path, const CommonOptions& common) {
   if (fs::is_directory(path) || path.filename() == kManifestName) {
     return describe_pack(fs::is_directory(path) ? path : path.parent_path());
   }
-  const std::string extension = path.extension().string();
-  if (extension == ".toml") {
+  const std::string ending = lower_case_ending(path);
+  if (ending == ".toml") {
     const TomlTable document = TomlTable::load(path);
     if (document.has("model")) return describe_surface_fabric(document);
     return document.has("weave") ? describe_fabric(path, common) : describe_scene(document);
   }
-  if (extension == ".safetensors") return describe_tensors(path, common);
-  if (extension == ".vdb") return describe_vdb(path);
-  if (extension == ".exr") return describe_image(path);
-  if (extension == ".obj") return describe_mesh(path);
-  throw FileError(path.string() +
-                  ": expected a pack, or a file that ends in .toml, .safetensors, .vdb, .exr or "
-                  ".obj, or the .json of "
-                  "an accuracy table");
+  if (ending == ".safetensors") return describe_tensors(path, common);
+  if (ending == ".vdb") return describe_vdb(path);
+  if (ending == ".exr") return describe_image(read_exr(path));
+  if (ending == ".hdr" || ending == ".pic") return describe_image(read_hdr(path));
+  if (ending == ".png") return describe_png(path);
+  if (ending == ".obj") return describe_mesh(path);
+  if (ending == ".json") return describe_json(path);
+  throw FileError(
+      path.string() +
+      ": expected a pack, or a file that ends in .toml, .safetensors, .vdb, .exr, .hdr, "
+      ".pic, .png, .obj or .json");
+}
+
+bool is_accuracy_table(const fs::path& path) {
+  if (lower_case_ending(path) != ".json" || path.filename() == kManifestName || !fs::exists(path))
+    return false;
+  const nlohmann::json json = read_json(path);
+  return json.is_object() && json.value("format", nlohmann::json()) == "heddle accuracy";
 }
 
 void print_text(const Report& report) {
@@ -262,7 +330,7 @@ void print_text(const Report& report) {
 }  // namespace
 
 int info_command(const fs::path& path, const CommonOptions& common) {
-  if (path.extension() == ".json" && path.filename() != kManifestName && fs::exists(path)) {
+  if (is_accuracy_table(path)) {
     const AccuracyTable table = read_accuracy(path);
     std::cout << (common.json ? accuracy_json(table).dump(2) + "\n" : accuracy_text(table));
     return 0;

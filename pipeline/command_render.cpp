@@ -6,6 +6,7 @@
 #include <span>
 
 #include "formats/atomic_file.h"
+#include "formats/file_ending.h"
 #include "formats/input_error.h"
 #include "pipeline/commands.h"
 #include "pipeline/job.h"
@@ -114,7 +115,7 @@ int render_within(double tolerance, const RenderOptions& options, Job& job) {
 }  // namespace
 
 int render_command(const RenderOptions& options, const CommonOptions& common) {
-  if (options.output.extension() != ".exr")
+  if (lower_case_ending(options.output) != ".exr")
     throw ConfigError("-o: expected a file name that ends in .exr");
   Job job(common);
   // Found out now, not after hours of work.

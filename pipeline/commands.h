@@ -17,7 +17,10 @@ namespace heddle {
 
 struct CommonOptions {
   std::filesystem::path cache;
-  std::optional<std::uint64_t> seed;  // in place of the config's
+  // In place of the fabric's seed, which draws its fibers and what is precomputed for them.
+  std::optional<std::uint64_t> fabric_seed;
+  // In place of the scene's seed, which draws the noise of its pictures.
+  std::optional<std::uint64_t> picture_seed;
   bool quiet = false;
   bool json = false;  // a report for programs on standard output
 };

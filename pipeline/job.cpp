@@ -13,7 +13,8 @@ Job::Job(const CommonOptions& options)
       console_(std::cerr, ::isatty(STDERR_FILENO) == 1, options.quiet),
       context_{.cache = Cache(options.cache),
                .console = &console_,
-               .seed = options.seed,
+               .fabric_seed = options.fabric_seed,
+               .picture_seed = options.picture_seed,
                .results = {}} {}
 
 void Job::finish() const {

@@ -78,7 +78,19 @@ void add_building(CLI::App& command, Options& options) {
   add_common(command, options);
   command.add_option("--cache", options.common.cache,
                      "Folder of the artifacts; by default $HEDDLE_CACHE, else out/cache");
-  command.add_option("--seed", options.common.seed, "In place of the seed that the config states");
+}
+
+/// Of commands that work on a fabric.
+void add_fabric_seed(CLI::App& command, Options& options) {
+  command.add_option("--seed", options.common.fabric_seed,
+                     "In place of the fabric's seed, which draws its fibers");
+}
+
+/// Of commands that make pictures of a scene.
+void add_picture_seed(CLI::App& command, Options& options) {
+  command.add_option("--seed", options.common.picture_seed,
+                     "In place of the scene's seed, which draws the noise of its pictures; fabrics "
+                     "keep their own seeds");
 }
 
 void add_order(CLI::App& command, std::optional<int>& order) {
@@ -102,6 +114,7 @@ void add_stage_command(CLI::App& app, Options& options, const std::string& name,
                        const std::string& help, StageTarget target, bool with_shard) {
   CLI::App* command = app.add_subcommand(name, help);
   add_building(*command, options);
+  add_fabric_seed(*command, options);
   command->add_option("FABRIC.toml", options.stage.fabric, "Fabric config")->required();
   if (target == StageTarget::kTransfer || target == StageTarget::kPack)
     add_order(*command, options.stage.order);
@@ -155,6 +168,7 @@ std::map<std::string, std::function<int()>> add_commands(CLI::App& app, Options&
   CLI::App* run = app.add_subcommand(
       "run", "Build everything that a scene lacks, then render its pictures: the main job");
   add_building(*run, options);
+  add_picture_seed(*run, options);
   run->add_option("SCENE.toml", options.run.scene, "Scene config")->required();
   run->add_option("-o,--output,--outfile", options.run.output,
                   "Folder of the pictures; out/NAME by default");
@@ -183,6 +197,7 @@ std::map<std::string, std::function<int()>> add_commands(CLI::App& app, Options&
   CLI::App* render = app.add_subcommand("render", "One picture of a scene");
   RenderOptions& picture = options.render;
   add_building(*render, options);
+  add_picture_seed(*render, options);
   render->add_option("SCENE.toml", picture.scene, "Scene config")->required();
   render
       ->add_option("-o,--output,--outfile", picture.output,
@@ -241,6 +256,7 @@ std::map<std::string, std::function<int()>> add_commands(CLI::App& app, Options&
   CLI::App* plan =
       app.add_subcommand("plan", "The cheapest way to a picture that is good enough, and why");
   add_building(*plan, options);
+  add_picture_seed(*plan, options);
   plan->add_option("SCENE.toml", options.plan.scene, "Scene config")->required();
   add_tolerance(*plan, options.plan.pictures,
                 "Largest relative RMSE per pixel, noise included: 0.05 is 5 %",
@@ -258,6 +274,7 @@ std::map<std::string, std::function<int()>> add_commands(CLI::App& app, Options&
       app.add_subcommand("chart", "Speed against accuracy, over the methods and their settings");
   ChartOptions& asked = options.chart;
   add_building(*chart, options);
+  add_picture_seed(*chart, options);
   chart->add_option("SCENE.toml", asked.scene, "Scene config")->required();
   chart->add_option("-o,--output,--outfile", asked.output, "Folder of the chart")->required();
   chart->add_option("--view", asked.view,
@@ -289,9 +306,11 @@ std::map<std::string, std::function<int()>> add_commands(CLI::App& app, Options&
   CLI::App* info =
       app.add_subcommand("info", "What a file holds: any of ours, or any that we read");
   add_common(*info, options);
-  info->add_option("--seed", options.common.seed, "In place of the seed that the config states");
-  info->add_option("PATH", options.path,
-                   "Fabric or scene .toml, pack, .safetensors, .vdb, .exr, .obj")
+  add_fabric_seed(*info, options);
+  info->add_option(
+          "PATH", options.path,
+          "Fabric or scene .toml, pack, .safetensors, .vdb, .exr, .hdr, .png, .obj, or one of "
+          "our .json files")
       ->required();
   actions["info"] = [&options] { return info_command(options.path, options.common); };
 

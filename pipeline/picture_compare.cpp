@@ -17,6 +17,16 @@ std::vector<Rgb> colors_of(const Image& image, const std::string& layer, const s
   }
 }
 
+/// The seed in the headers of both; empty where they differ or one does not say.
+std::string shared_seed(const Image& a, const Image& b) {
+  constexpr char kSeed[] = "heddle.seed";
+  const auto of_a = a.metadata.find(kSeed);
+  const auto of_b = b.metadata.find(kSeed);
+  if (of_a == a.metadata.end() || of_b == b.metadata.end() || of_a->second != of_b->second)
+    return "";
+  return of_a->second;
+}
+
 }  // namespace
 
 PictureComparison compare_images(const Image& picture, const std::string& picture_name,
@@ -30,8 +40,9 @@ PictureComparison compare_images(const Image& picture, const std::string& pictur
   const std::vector<Rgb> colors = colors_of(picture, layer, picture_name);
   const std::vector<Rgb> expected = colors_of(reference, layer, reference_name);
   PictureComparison result;
-  result.halves = layer.empty() && reference.channels.contains("half0.R") &&
-                  reference.channels.contains("half1.R");
+  result.shared_seed = shared_seed(picture, reference);
+  result.halves = result.shared_seed.empty() && layer.empty() &&
+                  reference.channels.contains("half0.R") && reference.channels.contains("half1.R");
   if (result.halves) {
     const std::vector<Rgb> half0 = colors_of(reference, "half0", reference_name);
     const std::vector<Rgb> half1 = colors_of(reference, "half1", reference_name);
@@ -66,7 +77,10 @@ nlohmann::ordered_json comparison_report(const PictureComparison& comparison) {
           {"mean_picture", list(error.mean_picture)},
           {"mean_reference", list(error.mean_reference)},
           {"relative_mean_difference", list(error.relative_difference)},
-          {"reference_in_two_halves", comparison.halves}};
+          {"reference_in_two_halves", comparison.halves},
+          {"shared_seed", comparison.shared_seed.empty()
+                              ? nlohmann::ordered_json()
+                              : nlohmann::ordered_json(comparison.shared_seed)}};
 }
 
 std::string comparison_text(const PictureComparison& comparison) {

@@ -2,7 +2,8 @@
 #define HEDDLE_PIPELINE_PICTURE_COMPARE_H_
 // Error metrics of a picture against a reference, and a picture of the difference. `heddle compare`
 // and the crops of `heddle run` report them. A reference with the layers half0 and half1 is used as
-// two independent halves, so that its noise does not count as error. Tested in
+// two independent halves, so that its noise does not count as error; but not if both pictures come
+// from one seed, since they then share noise. Tested in
 // tests/pipeline/picture_compare_test.cpp.
 
 #include <filesystem>
@@ -16,8 +17,9 @@ namespace heddle {
 
 struct PictureComparison {
   PictureError error;
-  bool halves = false;  // the reference came in two halves
-  Image difference;     // R, G, B: picture - reference
+  bool halves = false;      // the reference came in two halves, which were used
+  std::string shared_seed;  // of both pictures; empty where they differ or do not say
+  Image difference;         // R, G, B: picture - reference
   // [height][width][3]: white = equal, red = too bright, blue = too dark
   std::vector<std::uint8_t> preview;
 };

@@ -122,7 +122,7 @@ PictureRequest SceneJob::request(const ViewConfig& view) const {
   request.crop = {0, 0, view.camera.width, view.camera.height};
   request.method = config_.method;
   request.spp = view.spp;
-  request.seed = context_->seed.value_or(config_.seed);
+  request.seed = context_->picture_seed.value_or(config_.seed);
   return request;
 }
 

@@ -149,7 +149,8 @@ FabricDocument read_fabric_document(const fs::path& path, std::optional<std::uin
 
 FabricStages::FabricStages(const fs::path& fabric_file, StageContext& context,
                            const FabricVariant& variant, BakeChoices choices)
-    : document_(read_fabric_document(fabric_file, context.seed, variant)), context_(&context) {
+    : document_(read_fabric_document(fabric_file, context.fabric_seed, variant)),
+      context_(&context) {
   if (choices == BakeChoices::kShipped) return;
   if (document_.config.light_from_both_sides) {
     throw ConfigError(
@@ -343,6 +344,8 @@ bool FabricStages::finish_chunks(const Stage& stage, std::uint32_t items, std::u
       missing.push_back(first);
     }
   }
+  if (missing.empty()) return true;
+  const std::uint64_t abandoned_before = scene().abandoned_rays();
   Progress progress(*context_->console, stage.name, unit, items_of_shard, items_done);
   for (const std::uint32_t first : missing) {
     stop_if_interrupted();
@@ -350,6 +353,11 @@ bool FabricStages::finish_chunks(const Stage& stage, std::uint32_t items, std::u
     if (!publish_chunk(stage, first, first + size, compute)) return false;
     ++result.chunks;
     progress.advance(size);
+  }
+  if (const std::uint64_t abandoned = scene().abandoned_rays() - abandoned_before; abandoned > 0) {
+    context_->console->warn(fmt::format(
+        "{}: {} rays ran on through {} tiles without leaving the cloth; they count as not hit",
+        stage.name, abandoned, TileScene::kMaxTiles));
   }
   return true;
 }

@@ -86,7 +86,8 @@ struct StageResult {
 struct StageContext {
   Cache cache;
   Console* console;
-  std::optional<std::uint64_t> seed;  // in place of the fabric's
+  std::optional<std::uint64_t> fabric_seed;   // in place of every fabric's
+  std::optional<std::uint64_t> picture_seed;  // in place of the scene's
   std::vector<StageResult> results;
   WorkTime nested = {};                         // spent by stages that the running stage asked for
   std::set<std::filesystem::path> sound = {};   // artifacts that this command has verified or built

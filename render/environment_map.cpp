@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "fibers/math/sampling.h"
+#include "formats/file_ending.h"
 #include "formats/hdr_file.h"
 #include "formats/input_error.h"
 
@@ -55,9 +56,8 @@ EnvironmentMap::EnvironmentMap(int width, int height, std::vector<Rgb> radiance)
 }
 
 EnvironmentMap EnvironmentMap::read(const std::filesystem::path& path) {
-  std::string extension = path.extension().string();
-  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  const Image image = extension == ".hdr" || extension == ".pic" ? read_hdr(path) : read_exr(path);
+  const std::string ending = lower_case_ending(path);
+  const Image image = ending == ".hdr" || ending == ".pic" ? read_hdr(path) : read_exr(path);
   std::vector<Rgb> radiance(static_cast<std::size_t>(image.width) *
                             static_cast<std::size_t>(image.height));
   const char* names[] = {"R", "G", "B"};

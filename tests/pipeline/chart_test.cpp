@@ -285,6 +285,18 @@ TEST_F(ChartEndToEnd, RowsAreCompleteAndSorted) {
   EXPECT_NE(csv.find("\"path, local\",2 spp,spp=2,done"), std::string::npos);
 }
 
+TEST_F(ChartEndToEnd, InfoListsItsRuns) {
+  Program program(folder_->path(), {"info", path("chart") / "chart.json", "--json"});
+  const ProgramResult result = program.wait();
+  ASSERT_EQ(result.status, 0) << result.error;
+  const Json info = Json::parse(result.out);
+  EXPECT_EQ(info.at("kind"), "chart");
+  for (const Json& row : chart().at("rows")) {
+    EXPECT_TRUE(info.contains("run." + row.at("method").get<std::string>() + ", " +
+                              row.at("label").get<std::string>()));
+  }
+}
+
 // What the rows of one chart say of each other.
 TEST_F(ChartEndToEnd, RowsFollowTheirSettings) {
   const Json json = chart();

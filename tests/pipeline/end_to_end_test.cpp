@@ -273,6 +273,80 @@ TEST(PicturesEndToEnd, SameBytesForOneAndTwoThreadsAndNothingTwice) {
   EXPECT_EQ(shop.run({"render", "scene.toml", "-o", "x.exr", "--crop", "0,0,25,24"}).status, 2);
 }
 
+TEST(PicturesEndToEnd, TheSeedOfAPictureLeavesItsFabricsAlone) {
+  const Workshop shop;
+  shop.report({"render", "scene.toml", "-o", "first.exr"});
+  const Json other = shop.report({"render", "scene.toml", "-o", "other.exr", "--seed", "9"});
+  for (const Json& stage : other.at("stages"))
+    EXPECT_FALSE(stage.at("built").get<bool>()) << stage.dump();
+  EXPECT_EQ(read_exr(shop / "other.exr").metadata.at("heddle.seed"), "9");
+  const Json error = shop.report({"compare", "other.exr", "first.exr"});
+  EXPECT_GT(error.at("relative_rmse"), 0.0);
+  EXPECT_TRUE(error.at("shared_seed").is_null());
+
+  // A fabric's own seed draws other fibers, and so another artifact.
+  const Json fibers = shop.report({"synth", "fabric.toml"});
+  const Json others = shop.report({"synth", "fabric.toml", "--seed", "9"});
+  EXPECT_FALSE(fibers.at("stages").at(0).at("built").get<bool>());
+  EXPECT_TRUE(others.at("stages").at(0).at("built").get<bool>());
+  EXPECT_NE(fibers.at("artifacts").at(0), others.at("artifacts").at(0));
+}
+
+TEST(PicturesEndToEnd, CompareWarnsOfASharedSeed) {
+  const Workshop shop;
+  shop.report({"render", "scene.toml", "-o", "exact.exr"});
+  shop.report({"render", "scene.toml", "-o", "volume.exr", "--method", "volume"});
+  const ProgramResult shared = shop.run({"compare", "volume.exr", "exact.exr", "--json"});
+  EXPECT_EQ(shared.status, 0);
+  EXPECT_NE(shared.error.find("come from seed 1"), std::string::npos) << shared.error;
+  // What two pictures differ by in the mean, they differ by in the root mean square.
+  const Json error = Json::parse(shared.out);
+  EXPECT_EQ(error.at("shared_seed"), "1");
+  double mean_difference = 0;
+  double mean = 0;
+  for (int c = 0; c < 3; ++c) {
+    mean_difference += error.at("mean_picture").at(c).get<double>() -
+                       error.at("mean_reference").at(c).get<double>();
+    mean += error.at("mean_reference").at(c).get<double>();
+  }
+  EXPECT_GE(error.at("relative_rmse").get<double>(), std::abs(mean_difference) / mean);
+  const ProgramResult itself = shop.run({"compare", "exact.exr", "exact.exr"});
+  EXPECT_EQ(itself.error, "") << "equal pictures are equal, whatever their seed";
+}
+
+TEST(InfoEndToEnd, ReadsWhatTheProgramReadsAndWrites) {
+  const Workshop shop;
+  shop.report({"render", "scene.toml", "-o", "picture.exr"});
+  fs::copy_file(shop / "picture.exr", shop / "COPY.EXR");
+  fs::copy_file(shop / "picture.png", shop / "COPY.PNG");
+  fs::copy_file(shop / "scene.toml", shop / "COPY.TOML");
+  std::ofstream(shop / "sky.hdr", std::ios::binary)
+      << "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n"
+      << std::string("\x80\x40\x20\x81\x80\x40\x20\x81", 8);
+  fs::copy_file(shop / "sky.hdr", shop / "SKY.HDR");
+
+  EXPECT_EQ(shop.report({"info", "COPY.EXR"}), shop.report({"info", "picture.exr"}));
+  const Json screen = shop.report({"info", "COPY.PNG"});
+  const Json picture = shop.report({"info", "picture.exr"});
+  EXPECT_EQ(screen.at("resolution_px"), picture.at("resolution_px"));
+  EXPECT_EQ(screen.at("channels"), 3);
+  EXPECT_EQ(shop.report({"info", "COPY.TOML"}).at("kind"), "scene config");
+  const Json sky = shop.report({"info", "SKY.HDR"});
+  EXPECT_EQ(sky.at("resolution_px"), (Json{2, 1}));
+  // 128 / 256 of 2^(129 - 128).
+  EXPECT_NE(sky.at("channel.R").get<std::string>().find("mean 1 "), std::string::npos) << sky;
+  const Json report = shop.report({"info", "picture.json"});
+  EXPECT_EQ(report.at("kind"), "report of a picture");
+  EXPECT_EQ(report.at("heddle.method"), "exact");
+  for (const auto& entry : fs::directory_iterator(shop / "cache" / "synth")) {
+    if (entry.path().extension() == ".json") {
+      EXPECT_EQ(shop.report({"info", entry.path().string()}).at("kind"), "record of an artifact");
+    }
+  }
+  std::ofstream(shop / "other.json") << "[1, 2]";
+  EXPECT_EQ(shop.run({"info", "other.json"}).status, 1);
+}
+
 std::string edited(const char* original, const std::string& from, const std::string& to) {
   std::string text = original;
   const std::size_t at = text.find(from);
@@ -577,8 +651,11 @@ TEST(InputEndToEnd, BadInputIsNamed) {
 void store_table(const Workshop& shop, double bias) {
   std::ostringstream silent;
   Console console(silent, false, true);
-  StageContext context{
-      .cache = Cache(shop / "cache"), .console = &console, .seed = {}, .results = {}};
+  StageContext context{.cache = Cache(shop / "cache"),
+                       .console = &console,
+                       .fabric_seed = {},
+                       .picture_seed = {},
+                       .results = {}};
   const fs::path path = FabricStages(shop / "fabric.toml", context).accuracy_place().path;
   AccuracyTable table;
   table.fabric = "small";
@@ -780,8 +857,11 @@ TEST(RenderEndToEnd, MoreSamplesMakeThePictureOfAll) {
   const Workshop shop;
   std::ostringstream silent;
   Console console(silent, false, true);
-  StageContext context{
-      .cache = Cache(shop / "cache"), .console = &console, .seed = {}, .results = {}};
+  StageContext context{.cache = Cache(shop / "cache"),
+                       .console = &console,
+                       .fabric_seed = {},
+                       .picture_seed = {},
+                       .results = {}};
   SceneJob job(shop / "scene.toml", context);
   for (const RenderMethod method : {RenderMethod::kPath, RenderMethod::kExact}) {
     PictureRequest request = job.request(find_view(job.config(), ""));
