@@ -9,8 +9,8 @@
 namespace heddle {
 namespace {
 
-YarnPath flat_yarn(double length_mm) {
-  return {false, 0.5, length_mm / 4, 4, {0, 0, 0, 0}};
+YarnPath flat_yarn(double length_mm, bool is_warp = false) {
+  return {is_warp, 0.5, length_mm / 4, 4, {0, 0, 0, 0}};
 }
 
 YarnConfig yarn_of(int plies, int fibers, double wander_deg) {
@@ -73,6 +73,52 @@ TEST(FibersOfYarnLaw, TwistGivesTheAngleOfAHelix) {
     const double radius = std::hypot(m.y() - 0.5, m.z());
     const double expected = std::atan(2 * kPi * radius * 2);
     EXPECT_NEAR(std::acos(exemplar.segment_tangent(s).x()), expected, 0.01) << radius;
+  }
+}
+
+// Z twist is that of a right-handed screw: going around an axis, a fiber moves on along it as the
+// thumb of a right hand does, so that (place beside the axis x tangent) . axis > 0 for every piece,
+// whichever way the axis is followed. A ply without turns of its own is turned by its yarn alone;
+// its axis is the yarn's.
+TEST(FibersOfYarnLaw, PositiveTwistIsZ) {
+  for (const double turns : {1.5, -1.5}) {
+    for (const bool of_the_ply : {false, true}) {
+      YarnConfig yarn = yarn_of(of_the_ply ? 1 : 3, 12, 0);
+      (of_the_ply ? yarn.ply_turns_per_mm : yarn.yarn_turns_per_mm) = turns;
+      const Exemplar exemplar = fibers_of(yarn, 2, 0.01);
+      ASSERT_GT(exemplar.segment_count(), 1000U);
+      for (std::uint32_t s = 0; s < exemplar.segment_count(); ++s) {
+        const Vec3 beside = exemplar.segment_midpoint(s) - Vec3(0, 0.5F, 0);
+        const float hand = beside.cross(exemplar.segment_tangent(s)).x();
+        ASSERT_GT(hand * static_cast<float>(turns), 0) << s << (of_the_ply ? ", ply" : ", yarn");
+      }
+    }
+  }
+}
+
+// Fibers turn about the axis of their own ply, which is their mean over whole turns: as often as
+// the twist says, the innermost too.
+TEST(FibersOfYarnLaw, FibersTurnAboutTheirPly) {
+  YarnConfig yarn = yarn_of(2, 40, 0);
+  yarn.width_mm = yarn.height_mm = 0.4;
+  yarn.ply_turns_per_mm = 2;
+  const Exemplar exemplar = fibers_of(yarn, 2, 0.005);
+  const std::uint32_t per_fiber = exemplar.first_point[1] - 1;
+  for (std::uint32_t fiber = 0; fiber < 80; ++fiber) {
+    // The ply's axis: the mean of its fibers, here over one turn of each.
+    Vec3 axis = Vec3::Zero();
+    for (std::uint32_t f = fiber / 40 * 40; f < fiber / 40 * 40 + 40; ++f) {
+      for (std::uint32_t k = 0; k < per_fiber; ++k)
+        axis += exemplar.points[exemplar.first_point[f] + k] / static_cast<float>(40 * per_fiber);
+    }
+    double turned = 0;
+    for (std::uint32_t k = 0; k < per_fiber; ++k) {
+      const Vec3 from = exemplar.points[exemplar.first_point[fiber] + k] - axis;
+      const Vec3 to = exemplar.points[exemplar.first_point[fiber] + k + 1] - axis;
+      turned += std::atan2(static_cast<double>(from.y() * to.z() - from.z() * to.y()),
+                           static_cast<double>(from.y() * to.y() + from.z() * to.z()));
+    }
+    EXPECT_NEAR(turned / (2 * kPi), 4, 1e-3) << fiber;
   }
 }
 
