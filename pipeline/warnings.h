@@ -5,7 +5,7 @@
 // curve and limit against each other). `heddle check` says what is true of a pack whatever is
 // rendered from it; `render` and `run` say that and what is true of the picture, and put it into
 // the picture's report. A warning never changes a result or an exit status. Tested in
-// tests/pipeline/warnings_test.cpp.
+// tests/stability/warnings_test.cpp.
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
