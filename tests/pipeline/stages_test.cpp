@@ -15,6 +15,7 @@
 #include "fibers/baked/transfer.h"
 #include "formats/input_error.h"
 #include "formats/toml_table.h"
+#include "precompute/segment_cells.h"
 #include "precompute/visibility_settings.h"
 #include "tests/support/temporary_folder.h"
 
@@ -293,6 +294,14 @@ TEST(StageChunks, ACleanRunAndAResumeWarnOfNothing) {
     EXPECT_EQ(stages.said(), "");
     const StageResult& result = stages.result_of("transfer");
     const std::size_t cells = transfer.cell_count();
+    // As many as cubes of half a mean free path would hold fibers.
+    const Exemplar exemplar = read_exemplar(of_fabric.synth().path);
+    const TileScene scene(exemplar);
+    const double edge = 0.5 * scene.mean_free_path(7, kMeanFreePathSamples);
+    EXPECT_EQ(cells, make_segment_cells(
+                         exemplar, find_segment_origins(scene, false, OriginChoice::kExposed, 7),
+                         static_cast<float>(edge))
+                         .count);
     ASSERT_GT(cells, 64U);
     ASSERT_NE(cells % 32, 0U) << "the last chunk is to be a short one";
     const std::size_t chunks = (cells + 31) / 32;

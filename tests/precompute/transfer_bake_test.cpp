@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 #include "fibers/cloth/bundle_tangents.h"
 #include "fibers/cloth/synthesize.h"
@@ -229,6 +231,106 @@ TEST(TransferBakeLaw, ConesSortPathsAndLoseNone) {
   // but light through fibers (10 degrees each) does not for long.
   EXPECT_GT(on_cones, 0.3 * all);
   EXPECT_LT(on_cones, 0.95 * all);
+}
+
+/// Filaments along x whose pieces lean by the angle to one side and to the other, neighbours apart:
+/// their bundles run nearly along x.
+Exemplar leaning_filaments(double angle, double beta) {
+  FiberScattering mirror;
+  mirror.color_r = Rgbd(0.9, 0.9, 0.9);
+  mirror.beta_r = beta;
+  mirror.beta_tt = beta;
+  mirror.gamma_tt = radians(20);
+  Exemplar exemplar;
+  exemplar.width_mm = 0.6F;
+  exemplar.height_mm = 0.24F;
+  exemplar.scattering = {mirror};
+  exemplar.first_point = {0};
+  constexpr int kPieces = 12;
+  const auto rise = static_cast<float>(0.6 / kPieces * std::tan(angle));
+  for (int z = 0; z < 6; ++z) {
+    for (int y = 0; y < 12; ++y) {
+      // A zigzag, so that the fiber is periodic.
+      for (int k = 0; k <= kPieces; ++k) {
+        const float aside = (k + y + z) % 2 == 0 ? 0 : rise;
+        exemplar.points.emplace_back(0.6F * static_cast<float>(k) / kPieces,
+                                     0.02F * (static_cast<float>(y) + 0.5F) + aside,
+                                     0.02F * static_cast<float>(z));
+      }
+      exemplar.first_point.push_back(static_cast<std::uint32_t>(exemplar.points.size()));
+      exemplar.radius_mm.push_back(0.008F);
+      exemplar.material.push_back(0);
+    }
+  }
+  index_segments(exemplar);
+  return exemplar;
+}
+
+// A path widens with every hit by beta^2, and by sin^2 of the angle between the fiber and the
+// bundle that it began in; its class is that of the sum. The moments of each class are those of
+// paths that are sorted by hand, on mirrors of one beta.
+TEST(TransferBakeStatistical, PathsAreSortedByLobesAndByTheFibersAroundThem) {
+  const double beta = radians(1.5);
+  const Exemplar exemplar = leaning_filaments(radians(4), beta);
+  const TileScene scene(exemplar);
+  const std::vector<BcsdfTable> materials = {BcsdfTable(exemplar.scattering[0])};
+  const SegmentOrigins origins = find_segment_origins(scene, false, OriginChoice::kExposed, 1);
+  const std::vector<Vec3> bundles = bundle_tangents(exemplar);
+  SegmentCells cells;
+  cells.count = 1;
+  cells.cell_of_segment.assign(exemplar.segment_count(), 0);
+  TransferSettings settings = settings_of(0, 65536, false);
+  settings.cones = TransferSettings::Cones::kOn;
+  const TransferChunk chunk = TransferBaker(scene, materials, origins, settings, cells).bake(0, 1);
+
+  std::vector<double> chance;  // of a segment, running sum
+  for (const float openness : origins.openness)
+    chance.push_back((chance.empty() ? 0 : chance.back()) + openness + kLeastOpenness);
+  const TileTrace trace(scene);
+  constexpr int kPaths = 65536;
+  double sum[ConeTransfer::kWidths + 1] = {};
+  double squares[ConeTransfer::kWidths + 1] = {};
+  double below = 0;
+  for (int i = 0; i < kPaths; ++i) {
+    RandomStream random(1, RandomStage::kTest, 77, static_cast<std::uint64_t>(i));
+    const auto found =
+        std::upper_bound(chance.begin(), chance.end() - 1, random.uniform_double() * chance.back());
+    const auto segment = static_cast<std::uint32_t>(found - chance.begin());
+    const Vec3 w1 = sample_sphere(random);
+    const auto first = trace.next(trace.at(origins.position[segment], segment), w1);
+    if (!first) continue;
+    double variance = 0;
+    const auto escape = walk_path(trace, materials, *first, -w1, Rgb::Ones(), random, WalkLimits{},
+                                  [&](const TileTrace::Vertex& vertex, auto&&...) {
+                                    const double cosine = vertex.tangent.dot(bundles[segment]);
+                                    variance += beta * beta + 1 - cosine * cosine;
+                                    return true;
+                                  });
+    if (!escape || escape->direction.z() <= 0) continue;
+    const double predicted = degrees(std::sqrt(variance));
+    const int width = predicted < 5 ? 0 : predicted < 9 ? 1 : predicted < 13 ? 2 : 3;
+    sum[width] += escape->throughput[0];
+    squares[width] += escape->throughput[0] * escape->throughput[0];
+    below += w1.z() < 0 ? escape->throughput[0] : 0;
+  }
+  for (int width = 0; width < ConeTransfer::kWidths; ++width) {
+    // 4 pi Y_0 F_0 = 4 pi / sqrt(4 pi) / sqrt(2 pi) per unit of throughput.
+    const double unit = std::sqrt(2.0);
+    const double expected = unit * sum[width] / kPaths;
+    const double error = unit * std::sqrt(squares[width]) / kPaths;
+    const double got =
+        chunk.cones->moments[static_cast<std::size_t>(width) * ConeTransfer::kAzimuths * 3];
+    std::printf("class %d: %.4f, by hand %.4f +- %.4f\n", width, got, expected, error);
+    EXPECT_NEAR(got, expected, 5 * error) << width;
+    EXPECT_GT(expected, 20 * error) << width;
+    // Azimuths are measured from up: most of the light that was scattered before comes from below,
+    // where the cloth is. Of even and odd layers as much comes from either side.
+    const float* series =
+        &chunk.cones->moments[static_cast<std::size_t>(width) * ConeTransfer::kAzimuths * 3];
+    EXPECT_LT(series[3], -0.2 * got) << width;
+    EXPECT_LT(std::abs(series[6]), 0.1 * got) << width;
+  }
+  EXPECT_GT(below, 0.6 * (sum[0] + sum[1] + sum[2] + sum[3]));
 }
 
 TEST(TransferBakeLaw, ConesAreKeptWhereFilamentsAreParallelAndSpecular) {

@@ -350,6 +350,9 @@ TEST(MultipleScatteringLaw, SoftAndPrintedLightsLeaveConesInTheHarmonics) {
   EXPECT_EQ(LightShape(std::nullopt).cone_share(), 1);
   EXPECT_EQ(LightShape(1000.0F).cone_share(), 1);
   EXPECT_EQ(LightShape(5.0F).cone_share(), 0);
+  EXPECT_EQ(LightShape(8.0F).cone_share(), 0);
+  EXPECT_FLOAT_EQ(LightShape(14.0F).cone_share(), 0.5F);
+  EXPECT_EQ(LightShape(20.0F).cone_share(), 1);
   EXPECT_EQ(LightShape(std::nullopt, LightShape::FaceLight::kPrinted).cone_share(), 0);
   float last = 0;
   for (float sharpness = 5; sharpness < 25; sharpness += 0.5F) {

@@ -9,8 +9,8 @@
 namespace heddle {
 namespace {
 
-YarnPath flat_yarn(double length_mm, bool is_warp = false) {
-  return {is_warp, 0.5, length_mm / 4, 4, {0, 0, 0, 0}};
+YarnPath flat_yarn(double length_mm) {
+  return {false, 0.5, length_mm / 4, 4, {0, 0, 0, 0}};
 }
 
 YarnConfig yarn_of(int plies, int fibers, double wander_deg) {
@@ -119,6 +119,80 @@ TEST(FibersOfYarnLaw, FibersTurnAboutTheirPly) {
                            static_cast<double>(from.y() * to.y() + from.z() * to.z()));
     }
     EXPECT_NEAR(turned / (2 * kPi), 4, 1e-3) << fiber;
+  }
+}
+
+// Migration of depth m moves a fiber between its own distance from the ply's axis and 1 - m of it,
+// once per turn of the ply.
+TEST(FibersOfYarnLaw, MigrationIsAsDeepAsAsked) {
+  for (const double depth : {0.2, 0.5}) {
+    YarnConfig yarn = yarn_of(1, 30, 0);
+    yarn.width_mm = yarn.height_mm = 0.4;
+    yarn.ply_turns_per_mm = 1.5;
+    yarn.migration = depth;
+    const Exemplar exemplar = fibers_of(yarn, 2, 0.005);
+    for (std::uint32_t fiber = 0; fiber < exemplar.fiber_count(); ++fiber) {
+      const std::uint32_t first = exemplar.first_point[fiber];
+      const std::uint32_t last = exemplar.first_point[fiber + 1] - 1;
+      double nearest = 1;
+      double farthest = 0;
+      int turning_points = 0;
+      double before = -1;
+      bool rises = false;
+      for (std::uint32_t p = first; p < last; ++p) {
+        const double distance = std::hypot(exemplar.points[p].y() - 0.5, exemplar.points[p].z());
+        nearest = std::min(nearest, distance);
+        farthest = std::max(farthest, distance);
+        const bool rises_now = distance > before;
+        if (p > first + 1 && rises_now != rises) ++turning_points;
+        rises = rises_now;
+        before = distance;
+      }
+      // 130 points per turn: the extremes lie within half a step of a point.
+      EXPECT_NEAR(nearest / farthest, 1 - depth, 1e-3) << fiber;
+      // Three turns of the ply, two turning points each; one of them may lie at the seam.
+      EXPECT_NEAR(turning_points, 6, 1) << fiber;
+    }
+  }
+}
+
+// Plies are circles that touch each other and the yarn's edge: of n in a unit disc, the radius is
+// s / (1 + s), s = sin(pi / n), and the centre lies 1 less that from the axis. Two are stretched to
+// semi-axes of 1/2 and sqrt(1/2). One fills the yarn.
+TEST(FibersOfYarnLaw, PliesFillTheirPlaceInTheYarn) {
+  struct Shape {
+    int plies;
+    double centre, radial, tangential;
+  };
+  const double three = std::sqrt(0.75) / (1 + std::sqrt(0.75));
+  for (const Shape& shape :
+       {Shape{1, 0, 1, 1}, {2, 0.5, 0.5, std::sqrt(0.5)}, {3, 1 - three, three, three}}) {
+    constexpr int kFibers = 400;
+    const YarnConfig yarn = yarn_of(shape.plies, kFibers, 0);
+    const Exemplar exemplar = fibers_of(yarn, 2, 0.5);
+    for (int ply = 0; ply < shape.plies; ++ply) {
+      // In the yarn's unit disc; fibers run straight.
+      std::vector<Vec2> places;
+      Vec2 mean = Vec2::Zero();
+      for (int f = ply * kFibers; f < (ply + 1) * kFibers; ++f) {
+        const Vec3& p = exemplar.points[exemplar.first_point[static_cast<std::size_t>(f)]];
+        places.emplace_back((p.y() - 0.5F) / (0.2F - 0.005F), p.z() / (0.1F - 0.005F));
+        mean += places.back() / static_cast<float>(kFibers);
+      }
+      EXPECT_NEAR(mean.norm(), shape.centre, 0.01) << shape.plies;
+      const Vec2 towards = shape.centre > 0 ? Vec2(mean.normalized()) : Vec2(1, 0);
+      float radial = 0;
+      float tangential = 0;
+      for (const Vec2& place : places) {
+        const Vec2 offset = place - mean;
+        radial = std::max(radial, std::abs(offset.dot(towards)));
+        tangential =
+            std::max(tangential, std::abs(towards.x() * offset.y() - towards.y() * offset.x()));
+      }
+      // The outermost of 400 lie a hundredth within the edge, give or take their jitter.
+      EXPECT_NEAR(radial / shape.radial, 0.99, 0.02) << shape.plies;
+      EXPECT_NEAR(tangential / shape.tangential, 0.99, 0.02) << shape.plies;
+    }
   }
 }
 

@@ -99,6 +99,36 @@ TEST(TileSceneLaw, AWholePeriodChangesNothing) {
   EXPECT_LE(differing, 4);
 }
 
+// Where the cloth is cut into tiles does not matter: fibers and rays moved together by a part of a
+// period meet as before. Rays are flat, so that they cross many seams.
+TEST(TileSceneLaw, SeamsChangeNothing) {
+  const Exemplar exemplar = synthesize(test::small_fabric("twill 2/2"));
+  const Vec3 shift(0.37F * exemplar.width_mm, 0.41F * exemplar.height_mm, 0);
+  Exemplar moved = exemplar;
+  for (Vec3& point : moved.points) point += shift;
+  index_segments(moved);
+  const TileScene here(exemplar);
+  const TileScene there(moved);
+  int hits = 0;
+  int differing = 0;
+  for (int i = 0; i < 20'000; ++i) {
+    RandomStream random(1, RandomStage::kTest, 5, static_cast<std::uint64_t>(i));
+    const Vec3 origin(random.uniform() * exemplar.width_mm, random.uniform() * exemplar.height_mm,
+                      0.3F);
+    const float azimuth = 2 * kPif * random.uniform();
+    const Vec3 direction(std::cos(azimuth), std::sin(azimuth), -0.1F - 0.2F * random.uniform());
+    const auto a = here.intersect({origin, direction}, kNoFiber);
+    const auto b = there.intersect({origin + shift, direction}, kNoFiber);
+    hits += a ? 1 : 0;
+    const bool same = a.has_value() == b.has_value() &&
+                      (!a || (a->segment == b->segment && std::abs(a->t - b->t) < 1e-4F));
+    differing += same ? 0 : 1;
+  }
+  EXPECT_GT(hits, 15'000);
+  // Rays that graze a silhouette.
+  EXPECT_LE(differing, 20);
+}
+
 TEST(TileSceneLaw, OwnFiberIsIgnoredInEveryCopy) {
   // One fiber, endless rows of its copies: with itself excluded, nothing is left to hit.
   const TileScene scene(
