@@ -105,7 +105,8 @@ class Workshop {
 const Arguments kPrecompute = {"precompute", "fabric.toml", "-o", "pack"};
 
 /// Kills the job once a chunk of `stage` is on disk, and runs it again.
-void expect_same_bytes_after_kill(const fs::path& reference, const std::string& stage) {
+void expect_same_bytes_after_kill(const fs::path& reference, const std::string& stage,
+                                  std::uint64_t chunks_of_stage) {
   SCOPED_TRACE("killed during " + stage);
   const Workshop shop;
   const fs::path chunks = shop / "cache" / stage;
@@ -115,12 +116,22 @@ void expect_same_bytes_after_kill(const fs::path& reference, const std::string& 
   ASSERT_EQ(program.wait().status, -SIGKILL);
   ASSERT_TRUE(any_chunk_in(chunks)) << "the stage was over before it was killed";
 
+  // What a clean resume says beside its report: nothing.
+  Arguments quietly = kPrecompute;
+  quietly.insert(quietly.end(), {"--quiet", "--json"});
+  const ProgramResult resumed = shop.run(quietly);
+  ASSERT_EQ(resumed.status, 0) << resumed.error;
+  EXPECT_EQ(resumed.error, "");
   std::uint64_t found = 0;
-  const Json report = shop.report(kPrecompute);
+  std::uint64_t built = 0;
+  const Json report = Json::parse(resumed.out);
   for (const Json& entry : report.at("stages")) {
-    if (entry.at("stage") == stage) found = entry.at("chunks_found").get<std::uint64_t>();
+    if (entry.at("stage") != stage) continue;
+    found = entry.at("chunks_found").get<std::uint64_t>();
+    built = entry.at("chunks_built").get<std::uint64_t>();
   }
   EXPECT_GE(found, 1U);
+  EXPECT_EQ(found + built, chunks_of_stage) << "each chunk once";
   EXPECT_EQ(differences(reference, shop / "pack"), std::vector<std::string>{});
   EXPECT_FALSE(any_chunk_in(chunks)) << "chunks are removed once the artifact is published";
 }
@@ -163,8 +174,11 @@ TEST(StagesEndToEnd, SameBytesHoweverTheJobIsRun) {
       EXPECT_EQ(stage.at("chunks_built"), 0) << stage.dump();
     EXPECT_EQ(differences(reference, other / "pack"), std::vector<std::string>{});
   }
-  expect_same_bytes_after_kill(reference, "maps");
-  expect_same_bytes_after_kill(reference, "transfer");
+  for (const Json& entry : cold.at("stages")) {
+    const auto stage = entry.at("stage").get<std::string>();
+    if (stage == "maps" || stage == "transfer")
+      expect_same_bytes_after_kill(reference, stage, entry.at("chunks_built").get<std::uint64_t>());
+  }
 }
 
 TEST(StagesEndToEnd, SignalsEndWithTheirStatusAndKeepChunks) {
@@ -573,15 +587,51 @@ TEST(SurfacesEndToEnd, ThreadsLightsAndCamerasAreEditedWithoutPrecomputingAgain)
   EXPECT_EQ(built("pictures.sampled"), Stages{"edited"});
 }
 
+// docs/rivals.md says which part of each method is whose: parts of one author are alike to the
+// last digit, and parts of two are not. All see the same cloth: no mean is a multiple of another's
+// beyond what the methods are known to err by on this fabric (measured: printed -2 %, prt +46 %,
+// tsai-shih-16 twice, tsai-shih-full +0.1 %, dual-scattering -56 % of exact).
 TEST(RivalsEndToEnd, EveryMethodRendersTheScene) {
   const Workshop shop;
-  for (const char* method :
-       {"path-6", "printed", "prt", "tsai-shih-16", "tsai-shih-full", "dual-scattering"}) {
-    const std::string file = std::string(method) + ".exr";
+  const std::vector<std::string> methods = {
+      "exact", "volume",       "path-6",         "printed",
+      "prt",   "tsai-shih-16", "tsai-shih-full", "dual-scattering"};
+  std::map<std::string, Image> pictures;
+  for (const std::string& method : methods) {
+    const std::string file = method + ".exr";
     const ProgramResult result = shop.run({"render", "scene.toml", "-o", file, "--method", method,
                                            "--crop", "8,8,14,14", "--spp", "2"});
-    EXPECT_EQ(result.status, 0) << method << ": " << result.error;
+    ASSERT_EQ(result.status, 0) << method << ": " << result.error;
+    pictures[method] = read_exr(shop / file);
   }
+  const auto values = [&](const std::string& method, const char* channel) {
+    return pictures.at(method).channels.at(channel).values;
+  };
+  const auto mean = [&](const std::string& method, const char* channel) {
+    double sum = 0;
+    for (const float value : values(method, channel)) sum += static_cast<double>(value);
+    return sum / static_cast<double>(values(method, channel).size());
+  };
+  for (const std::string& a : methods) {
+    for (const std::string& b : methods) {
+      if (a < b) {
+        EXPECT_NE(values(a, "G"), values(b, "G")) << a << " and " << b;
+      }
+    }
+  }
+  for (const char* ours : {"prt", "tsai-shih-16", "tsai-shih-full"}) {
+    EXPECT_EQ(values(ours, "multiple.G"), values("exact", "multiple.G")) << ours;
+    EXPECT_NE(values(ours, "single.G"), values("exact", "single.G")) << ours;
+  }
+  EXPECT_NE(values("dual-scattering", "multiple.G"), values("exact", "multiple.G"));
+  EXPECT_NE(values("printed", "multiple.G"), values("exact", "multiple.G"));
+  const auto of_exact = [&](const char* method) { return mean(method, "G") / mean("exact", "G"); };
+  EXPECT_NEAR(of_exact("volume"), 1, 0.1);
+  EXPECT_NEAR(of_exact("tsai-shih-full"), 1, 0.02);
+  EXPECT_NEAR(of_exact("printed"), 1, 0.15);
+  EXPECT_NEAR(of_exact("prt"), 1.46, 0.3);
+  EXPECT_NEAR(of_exact("tsai-shih-16"), 1.98, 0.4);
+  EXPECT_NEAR(of_exact("dual-scattering"), 0.44, 0.15);
   // Six scattering events are what the path tracer's own limit says.
   ASSERT_EQ(shop.run({"render", "scene.toml", "-o", "limited.exr", "--method", "path", "--bounces",
                       "6", "--crop", "8,8,14,14", "--spp", "2"})

@@ -95,6 +95,115 @@ TEST(FlipLaw, GreysFollowTheirLightness) {
   EXPECT_NEAR(large / small, expected, 1e-3 * expected);
 }
 
+// A white pixel on black, by the paper's formulas. The luminance at a distance of (x, y) pixels is
+// the achromatic Gaussian there, exp(-pi^2 (x^2 + y^2) / (0.0047 p^2)) over its sum, p = 67.02
+// pixels per degree: its L*, to the power of 0.7, is the colour difference, of which the remap
+// makes 0.95 / (0.4 m) times as much, m = 203.3^0.7. The difference of points is, along each axis,
+// the second derivative of a Gaussian of deviation s = 0.041 p there, whose parts above and below 0
+// are divided by their sums; of edges likewise the first; the larger counts, and the square root of
+// it over sqrt(2).
+TEST(FlipLaw, AWhitePixelAsThePapersFormulasHaveIt) {
+  Picture point = uniform_picture(Rgb(0, 0, 0));
+  point[16 * kWidth + 20] = Rgb(1, 1, 1);
+  const std::vector<float> map = flip_map(uniform_picture(Rgb(0, 0, 0)), point, kWidth, kHeight);
+  const double p = 0.7 * 3840 / 0.7 * kPi / 180;
+  const double s = 0.041 * p;
+  const auto achromatic = [p](int x, int y) {
+    return std::exp(-kPi * kPi * (x * x + y * y) / (0.0047 * p * p));
+  };
+  const auto gaussian = [s](int x, int y) { return std::exp(-(x * x + y * y) / (2 * s * s)); };
+  const auto edge = [&](int x, int y) { return x * gaussian(x, y); };
+  const auto bump = [&](int x, int y) { return (1 - x * x / (s * s)) * gaussian(x, y); };
+  double total = 0;
+  double of_edge = 0;
+  double above = 0;
+  double below = 0;
+  for (int y = -10; y <= 10; ++y) {
+    for (int x = -10; x <= 10; ++x) {
+      total += achromatic(x, y);
+      if (std::max(std::abs(x), std::abs(y)) > 9) continue;  // the detectors' radius, 3 s
+      of_edge += std::max(0.0, edge(x, y));
+      above += std::max(0.0, bump(x, y));
+      below -= std::min(0.0, bump(x, y));
+    }
+  }
+  const auto share = [](double value, double over, double under) {
+    return value / (value > 0 ? over : under);
+  };
+  for (int y = -6; y <= 6; ++y) {
+    for (int x = -6; x <= 6; ++x) {
+      const double luminance = achromatic(x, y) / total;
+      const double root = luminance > std::pow(6.0 / 29, 3) ? std::cbrt(luminance)
+                                                            : luminance * 841 / 108 + 4.0 / 29;
+      const double color =
+          std::pow(std::max(0.0, 116 * root - 16), 0.7) * 0.95 / (0.4 * std::pow(203.3, 0.7));
+      ASSERT_LT(color, 0.95);
+      const double edges = std::hypot(edge(x, y), edge(y, x)) / of_edge;
+      const double points =
+          std::hypot(share(bump(x, y), above, below), share(bump(y, x), above, below));
+      const double features = std::sqrt(std::max(edges, points) / std::sqrt(2));
+      EXPECT_NEAR(map[static_cast<std::size_t>((16 + y) * kWidth + 20 + x)],
+                  std::pow(color, 1 - features), 2e-4)
+          << x << ' ' << y;
+    }
+  }
+}
+
+// What the authors' own program gives (github.com/NVlabs/flip, python/flip_api.py of 2021, at
+// double precision): one pixel of a colour on a ground of another, and an edge between two colours;
+// some pixels of each. Its matrices are rounded otherwise: differences below 1e-4.
+TEST(FlipAgreement, PixelsOfTheAuthorsProgram) {
+  struct Pixel {
+    int x, y;
+    double value;
+  };
+  const auto compare = [](const char* name, const Picture& a, const Picture& b,
+                          const std::vector<Pixel>& pixels) {
+    const std::vector<float> map = flip_map(a, b, kWidth, kHeight);
+    for (const Pixel& pixel : pixels) {
+      EXPECT_NEAR(map[static_cast<std::size_t>(pixel.y * kWidth + pixel.x)], pixel.value, 2e-4)
+          << name << ' ' << pixel.x << ' ' << pixel.y;
+    }
+  };
+  const auto with_pixel = [](const Rgb& ground, const Rgb& color) {
+    Picture picture = uniform_picture(ground);
+    picture[16 * kWidth + 20] = color;
+    return picture;
+  };
+  const Rgb black(0, 0, 0);
+  compare("white on black", uniform_picture(black), with_pixel(black, Rgb(1, 1, 1)),
+          {{20, 16, 0.86491}, {21, 16, 0.76349}, {20, 18, 0.48056}, {22, 19, 0.04305}});
+  const Rgb grey(0.5F, 0.5F, 0.5F);
+  compare("red on grey", uniform_picture(grey), with_pixel(grey, Rgb(1, 0.2F, 0.1F)),
+          {{20, 16, 0.21971},
+           {21, 16, 0.16553},
+           {20, 18, 0.07172},
+           {25, 16, 0.01193},
+           {20, 9, 0.00424}});
+  compare("blue on black", uniform_picture(black), with_pixel(black, Rgb(0.1F, 0.2F, 1)),
+          {{20, 16, 0.58817},
+           {21, 16, 0.48783},
+           {20, 18, 0.22033},
+           {25, 16, 0.03050},
+           {20, 9, 0.01070}});
+  const Rgb dim(0.2F, 0.2F, 0.2F);
+  compare("dim on grey", uniform_picture(dim), with_pixel(dim, Rgb(0.3F, 0.3F, 0.3F)),
+          {{20, 16, 0.09607}, {21, 16, 0.07033}, {20, 18, 0.02709}});
+  const Picture dark = uniform_picture(Rgb(0.1F, 0.1F, 0.1F));
+  Picture edge = dark;
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 20; x < kWidth; ++x)
+      edge[static_cast<std::size_t>(y * kWidth + x)] = Rgb(0.3F, 0.3F, 0.2F);
+  }
+  compare("edge", dark, edge,
+          {{19, 16, 0.51443},
+           {20, 16, 0.65630},
+           {17, 5, 0.19432},
+           {23, 31, 0.71223},
+           {30, 16, 0.64842},
+           {10, 16, 0.00119}});
+}
+
 // One white pixel on black is a point where the other picture has none: worse than the same light
 // spread out evenly, and worst next to itself.
 TEST(FlipLaw, PointsCountWhereTheyAre) {

@@ -245,13 +245,17 @@ CameraConfig small_camera() {
   return camera;
 }
 
-FrameBuffers small_picture(const PixelRect& crop, int spp, const MoreSamples& more = {}) {
+FrameBuffers small_picture(const PixelRect& crop, int spp, const MoreSamples& more = {},
+                           int enlarged = 1) {
   const World world = make_world(crossed_layers(test_cotton()), {curved_patch()},
                                  {sg_light({-0.4F, 0.3F, 1}, 150, Rgb(3, 3, 3)),
                                   {LightType::kDirectional, Vec3(0.6F, 0, 0.8F), 0, Rgb(1, 1, 1)}});
   const PathTracer tracer = world.tracer(LightEstimator::kCombined);
+  CameraConfig camera = small_camera();
+  camera.width *= enlarged;
+  camera.height *= enlarged;
   double last = -1;
-  return trace_picture(tracer, Camera(small_camera()), crop, 5, {spp, {}, more}, [&](double share) {
+  return trace_picture(tracer, Camera(camera), crop, 5, {spp, {}, more}, [&](double share) {
     // More samples begin anew.
     EXPECT_TRUE(share >= last || more);
     last = share;
@@ -303,12 +307,45 @@ TEST(PathTracerEndToEnd, MoreSamplesMakeThePictureOfAll) {
   EXPECT_TRUE(same(grown.variance, whole.variance));
 }
 
+// What a pixel stores of four samples, by hand: means of all and of every other one, and the
+// variance of the mean, s^2 / n with s^2 the sample variance. Totals of green: 1, 2, 4, 9, mean 4,
+// squares of their distances from it 9, 4, 0, 25: s^2 = 38 / 3.
+TEST(PixelSumsLaw, MeansHalvesAndVarianceOfFourSamples) {
+  const float singles[4] = {0.5F, 1, 1, 4};
+  const float multiples[4] = {0.25F, 1, 2, 5};
+  const float backgrounds[4] = {0.25F, 0, 1, 0};
+  const float alphas[4] = {1, 0, 1, 1};
+  PixelSums sums;
+  for (int s = 0; s < 4; ++s) {
+    // Red twice green, blue nothing.
+    const Rgb color(2, 1, 0);
+    sums.add({color * singles[s], color * multiples[s], color * backgrounds[s], alphas[s]}, s);
+  }
+  FrameBuffers frame(2, 1);
+  for (std::vector<Rgb>* layer : {&frame.half0, &frame.half1, &frame.variance})
+    layer->assign(2, Rgb::Zero());
+  sums.store(4, 1, frame);
+  const auto expect_color = [](const std::vector<Rgb>& layer, double green, double red) {
+    EXPECT_NEAR(layer[1][1], green, 1e-6);
+    EXPECT_NEAR(layer[1][0], red, 1e-6);
+    EXPECT_EQ(layer[1][2], 0);
+    EXPECT_EQ(layer[0].maxCoeff(), 0) << "another pixel's";
+  };
+  expect_color(frame.beauty, 4, 8);
+  expect_color(frame.single, 6.5 / 4, 13.0 / 4);
+  expect_color(frame.multiple, 8.25 / 4, 16.5 / 4);
+  expect_color(frame.half0, 2.5, 5);
+  expect_color(frame.half1, 5.5, 11);
+  expect_color(frame.variance, 38.0 / 3 / 4, 4 * 38.0 / 3 / 4);
+  EXPECT_FLOAT_EQ(frame.alpha[1], 0.75F);
+}
+
 // What the buffers say of themselves: the halves average to the beauty, single and multiple add up
 // to it, and the two halves differ as much as the variance says (each half has twice the variance
 // of the mean).
 TEST(PathTracerStatistical, BuffersAreConsistent) {
-  const FrameBuffers frame = small_picture({0, 0, 24, 16}, 64);
-  EXPECT_EQ(frame.spp, 64);
+  const FrameBuffers frame = small_picture({0, 0, 120, 80}, 16, {}, 5);
+  EXPECT_EQ(frame.spp, 16);
   double expected = 0;
   double observed = 0;
   int lit = 0;
@@ -323,10 +360,10 @@ TEST(PathTracerStatistical, BuffersAreConsistent) {
     observed += difference * difference;
   }
   // Each term of the sum is a squared normal: relative standard deviation sqrt(2) if all variances
-  // were equal; they differ, so allow twice the count's standard error times 4.
+  // were equal; they differ, so allow twice the count's standard error times 4: 20 %.
   std::printf("  %d pixels: squared difference of halves %.4g, expected %.4g\n", lit, observed,
               expected);
-  EXPECT_GT(lit, 100);
+  EXPECT_GT(lit, 3000);
   EXPECT_NEAR(observed / expected, 1, 4 * 2 * std::sqrt(2.0 / lit));
 }
 

@@ -33,6 +33,35 @@ TEST(YarnPathsLaw, CrestsGoOverAndUnderAsTheWeaveSays) {
   }
 }
 
+// A yarn is at its crest where it crosses another, and half way between two crests in the middle
+// between two crossings. The warp takes its share of the crimp, the weft the rest.
+TEST(YarnPathsLaw, CrestsLieAtTheCrossingsAndShareTheCrimp) {
+  for (const double share : {0.0, 0.3, 1.0}) {
+    FabricConfig config = test::small_fabric("twill 3/1");
+    config.crimp_warp = share;
+    const YarnPaths paths = lay_yarns(config);
+    double warp_crest = 0;
+    double weft_crest = 0;
+    for (const std::vector<YarnPath>* yarns : {&paths.warp, &paths.weft}) {
+      const bool is_warp = yarns == &paths.warp;
+      for (const YarnPath& yarn : *yarns) {
+        EXPECT_EQ(yarn.is_warp, is_warp);
+        const std::vector<YarnPath>& others = is_warp ? paths.weft : paths.warp;
+        for (std::size_t k = 0; k < others.size(); ++k) {
+          const double here = yarn.crest_mm[k % yarn.crest_mm.size()];
+          const double next = yarn.crest_mm[(k + 1) % yarn.crest_mm.size()];
+          const double crossing = others[k].across_mm;
+          EXPECT_NEAR(yarn.height_at(crossing), here, 1e-12);
+          EXPECT_NEAR(yarn.height_at(crossing + yarn.crossing_spacing_mm / 2), (here + next) / 2,
+                      1e-12);
+          (is_warp ? warp_crest : weft_crest) = std::abs(here);
+        }
+      }
+    }
+    EXPECT_NEAR(warp_crest, share * (warp_crest + weft_crest), 1e-12);
+  }
+}
+
 // Copies of the weave ask for the same crests, but for rounding.
 TEST(YarnPathsLaw, CrestsDoNotDependOnTheNumberOfRepeats) {
   FabricConfig config = test::small_fabric("satin 8/3");

@@ -61,6 +61,48 @@ TEST(PathWalkLaw, FurnaceByScatteringIsExactlyOne) {
   EXPECT_GT(paths, 2000);
 }
 
+// Each hit widens a path by the lobe that scattered it: its variance is the sum of their squared
+// betas, n beta^2 after n hits on fibers that reflect only.
+TEST(PathWalkLaw, VariancesOfLobesAddUp) {
+  const TileScene scene(synthesize(test::small_fabric("twill 2/2")));
+  const TileTrace trace(scene);
+  FiberScattering reflecting = dyed_fiber();
+  reflecting.color_r = Rgbd(1, 1, 1);
+  reflecting.color_tt = Rgbd(0, 0, 0);
+  for (const FiberScattering& fiber : {reflecting, dyed_fiber()}) {
+    const std::vector<BcsdfTable> materials = {BcsdfTable(fiber)};
+    const double r = std::pow(fiber.beta_r, 2);
+    const double tt = std::pow(fiber.beta_tt, 2);
+    const bool one_lobe = fiber.color_tt.maxCoeff() == 0;
+    int several = 0;
+    int of_both_lobes = 0;
+    for (int i = 0; i < 3000; ++i) {
+      RandomStream random(1, RandomStage::kTest, 14, static_cast<std::uint64_t>(i));
+      const Vec3 direction = sample_hemisphere(Vec3(0, 0, -1), random);
+      const auto first = trace.first(Vec3(random.uniform(), random.uniform(), 1), direction);
+      if (!first) continue;
+      int visits = 0;
+      const auto escape = walk_path(
+          trace, materials, *first, -direction, Rgb::Ones(), random, WalkLimits{},
+          [&](const auto&, const Mat3&, const Vec3&, const Rgb&, int n) { return n == ++visits; });
+      if (!escape) continue;
+      EXPECT_EQ(escape->scatterings, visits);
+      several += escape->scatterings > 2 ? 1 : 0;
+      // How many of the hits were on the TT lobe.
+      const double transmitted = (escape->variance - escape->scatterings * r) / (tt - r);
+      const double whole = std::round(transmitted);
+      EXPECT_NEAR(transmitted, whole, 1e-4 * escape->scatterings);
+      EXPECT_GE(whole, 0);
+      EXPECT_LE(whole, one_lobe ? 0 : escape->scatterings);
+      of_both_lobes += whole > 0 && whole < escape->scatterings ? 1 : 0;
+    }
+    EXPECT_GT(several, 200);
+    if (!one_lobe) {
+      EXPECT_GT(of_both_lobes, 200);
+    }
+  }
+}
+
 // The same by light sampling only: at every vertex the light is asked for in one uniform direction.
 TEST(PathWalkStatistical, FurnaceByLightSamplingIsOne) {
   const TileScene scene(synthesize(test::small_fabric()));
