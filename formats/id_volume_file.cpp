@@ -1,9 +1,9 @@
 #include "formats/id_volume_file.h"
 
 #include <fmt/format.h>
+#include <openvdb/Grid.h>
+#include <openvdb/io/Archive.h>
 #include <openvdb/io/Stream.h>
-#include <openvdb/openvdb.h>
-#include <openvdb/tools/Dense.h>
 
 #include <algorithm>
 #include <cassert>
@@ -15,9 +15,22 @@
 #include "formats/content_hash.h"
 #include "formats/input_error.h"
 
+// Declared in openvdb/openvdb.h, which also brings in the grids of points: half of this file's time
+// in the compiler.
+namespace openvdb {
+OPENVDB_USE_VERSION_NAMESPACE
+namespace OPENVDB_VERSION_NAME {
+OPENVDB_API void initialize();
+}  // namespace OPENVDB_VERSION_NAME
+}  // namespace openvdb
+
 namespace heddle {
 
 namespace {
+
+using IdTree = openvdb::tree::Tree4<std::int32_t, 5, 4, 3>::Type;
+using IdGrid = openvdb::Grid<IdTree>;
+constexpr const char* kGridType = "Tree_int32_5_4_3";
 
 constexpr int kMaxExtent = 4096;
 constexpr std::uint64_t kMaxVoxels = std::uint64_t{1} << 31;
@@ -36,9 +49,6 @@ constexpr const char* kOriginKey = "origin_mm";
 constexpr std::size_t kIdentifierAt = 21;
 constexpr std::string_view kZeroIdentifier = "00000000-0000-0000-0000-000000000000";
 
-/// x fastest, like IdVolume::ids.
-using DenseIds = openvdb::tools::Dense<std::int32_t, openvdb::tools::LayoutXYZ>;
-
 /// Empty where the size is fine.
 std::string size_problem(const std::array<int, 3>& size) {
   std::uint64_t voxels = 1;
@@ -53,6 +63,57 @@ std::string size_problem(const std::array<int, 3>& size) {
 
 openvdb::CoordBBox box_of(const std::array<int, 3>& size) {
   return {openvdb::Coord(0), openvdb::Coord(size[0] - 1, size[1] - 1, size[2] - 1)};
+}
+
+/// Calls visit(origin, extent) for every cube of 8 x 8 x 8 voxels, a leaf of the tree, or what of
+/// it lies within the volume.
+template <class Visit>
+void for_each_leaf(const std::array<int, 3>& size, Visit&& visit) {
+  constexpr int kEdge = IdTree::LeafNodeType::DIM;
+  for (int x = 0; x < size[0]; x += kEdge) {
+    for (int y = 0; y < size[1]; y += kEdge) {
+      for (int z = 0; z < size[2]; z += kEdge) {
+        visit(openvdb::Coord(x, y, z),
+              openvdb::Coord(std::min(kEdge, size[0] - x), std::min(kEdge, size[1] - y),
+                             std::min(kEdge, size[2] - z)));
+      }
+    }
+  }
+}
+
+/// Calls visit(voxel, index into IdVolume::ids) for the voxels of a cube.
+template <class Visit>
+void for_each_voxel(const std::array<int, 3>& size, const openvdb::Coord& origin,
+                    const openvdb::Coord& extent, Visit&& visit) {
+  for (int z = origin.z(); z < origin.z() + extent.z(); ++z) {
+    for (int y = origin.y(); y < origin.y() + extent.y(); ++y) {
+      const std::size_t row = (static_cast<std::size_t>(z) * size[1] + y) * size[0];
+      for (int x = origin.x(); x < origin.x() + extent.x(); ++x)
+        visit(openvdb::Coord(x, y, z), row + static_cast<std::size_t>(x));
+    }
+  }
+}
+
+/// Voxels that hold an id are active, all others background.
+void fill_tree(const IdVolume& volume, IdTree& tree) {
+  for_each_leaf(volume.size, [&](const openvdb::Coord& origin, const openvdb::Coord& extent) {
+    IdTree::LeafNodeType* leaf = nullptr;
+    for_each_voxel(volume.size, origin, extent, [&](const openvdb::Coord& voxel, std::size_t k) {
+      if (volume.ids[k] == kEmpty) return;
+      if (leaf == nullptr) leaf = tree.touchLeaf(origin);
+      leaf->setValueOn(voxel, volume.ids[k]);
+    });
+  });
+}
+
+void read_tree(const IdTree& tree, IdVolume& volume) {
+  for_each_leaf(volume.size, [&](const openvdb::Coord& origin, const openvdb::Coord& extent) {
+    const IdTree::LeafNodeType* const leaf = tree.probeConstLeaf(origin);
+    const std::int32_t of_tile = leaf == nullptr ? tree.getValue(origin) : 0;
+    for_each_voxel(volume.size, origin, extent, [&](const openvdb::Coord& voxel, std::size_t k) {
+      volume.ids[k] = leaf == nullptr ? of_tile : leaf->getValue(voxel);
+    });
+  });
 }
 
 openvdb::Vec3d vec(const std::array<double, 3>& v) {
@@ -72,9 +133,8 @@ openvdb::math::Transform::Ptr transform_of(const IdVolume& volume) {
 
 /// 32 hexadecimal digits as an identifier is written: in groups of 8, 4, 4, 4 and 12.
 std::string as_identifier(const std::string& digits) {
-  std::string text = digits;
-  for (const std::size_t dash : {8, 13, 18, 23}) text.insert(dash, "-");
-  return text;
+  return fmt::format("{}-{}-{}-{}-{}", digits.substr(0, 8), digits.substr(8, 4),
+                     digits.substr(12, 4), digits.substr(16, 4), digits.substr(20));
 }
 
 /// Checksum of a file's bytes with zeros in place of the identifier.
@@ -97,7 +157,9 @@ class SeekableArchive : public openvdb::io::Archive {
 
 std::string vdb_bytes(const IdVolume& volume, const std::map<std::string, std::string>& metadata) {
   openvdb::initialize();
-  auto grid = openvdb::Int32Grid::create(kEmpty);
+  // Made by the library, and pruned by it: what this file makes itself, the compiler builds anew.
+  const auto grid = openvdb::gridPtrCast<IdGrid>(openvdb::GridBase::createGrid(kGridType));
+  grid->tree().root().setBackground(kEmpty, false);
   grid->setName(kGridName);
   grid->setTransform(transform_of(volume));
   for (const auto& [key, text] : metadata) grid->insertMeta(key, openvdb::StringMetadata(text));
@@ -105,9 +167,9 @@ std::string vdb_bytes(const IdVolume& volume, const std::map<std::string, std::s
                    openvdb::Vec3IMetadata({volume.size[0], volume.size[1], volume.size[2]}));
   grid->insertMeta(kVoxelKey, openvdb::Vec3DMetadata(vec(volume.voxel_mm)));
   grid->insertMeta(kOriginKey, openvdb::Vec3DMetadata(vec(volume.origin_mm)));
-  // A Dense wraps memory that may be written to; copyFromDense only reads it.
-  const DenseIds dense(box_of(volume.size), const_cast<std::int32_t*>(volume.ids.data()));
-  openvdb::tools::copyFromDense(dense, *grid, std::int32_t{0});
+  fill_tree(volume, grid->tree());
+  openvdb::GridBase& base = *grid;
+  base.pruneGrid(0);  // cubes of one id become tiles
 
   SeekableArchive archive;
   std::uint32_t compression = openvdb::io::COMPRESS_ACTIVE_MASK;
@@ -140,12 +202,11 @@ IdVolume read_vdb(const std::string& bytes) {
   openvdb::initialize();
   std::istringstream stream(bytes, std::ios::binary);
   const openvdb::GridPtrVecPtr grids = openvdb::io::Stream(stream, /*delayLoad=*/false).getGrids();
-  const auto grid = grids->size() == 1 && grids->front()->getName() == kGridName
-                        ? openvdb::gridPtrCast<openvdb::Int32Grid>(grids->front())
-                        : nullptr;
-  if (grid == nullptr)
+  if (grids->size() != 1 || grids->front()->getName() != kGridName ||
+      grids->front()->type() != kGridType)
     throw FileError(fmt::format("'{}' is not its only grid, of 32-bit integers", kGridName));
 
+  const openvdb::GridBase::ConstPtr grid = grids->front();
   IdVolume volume;
   const openvdb::Vec3i size = required_metadata<openvdb::Vec3IMetadata>(*grid, kSizeKey);
   volume.size = {size.x(), size.y(), size.z()};
@@ -164,8 +225,7 @@ IdVolume read_vdb(const std::string& bytes) {
     throw FileError("voxels outside its own size");
 
   volume.ids.resize(static_cast<std::size_t>(volume.size[0]) * volume.size[1] * volume.size[2]);
-  DenseIds dense(box_of(volume.size), volume.ids.data());
-  openvdb::tools::copyToDense(*grid, dense);
+  read_tree(openvdb::gridConstPtrCast<IdGrid>(grid)->tree(), volume);
   if (std::any_of(volume.ids.begin(), volume.ids.end(),
                   [](std::int32_t id) { return id < kEmpty; })) {
     throw FileError("an id below -1");

@@ -5,8 +5,8 @@
 #include <map>
 
 #include "formats/atomic_file.h"
-#include "formats/content_hash.h"
 #include "formats/input_error.h"
+#include "formats/seal_json.h"
 #include "pipeline/cache.h"
 #include "pipeline/sealed_json.h"
 #include "pipeline/version.h"
@@ -32,8 +32,7 @@ Seals seals_of(const fs::path& artifact) {
 
 Json record_json(const Seals& seals, const BuildCost& cost) {
   Json files = Json::object();
-  for (const auto& [name, seal] : seals)
-    files[name] = {{"bytes", seal.bytes}, {"xxh3_128", seal.xxh3_128}};
+  for (const auto& [name, seal] : seals) files[name] = json_of(seal);
   return {{"files", files},
           {"seconds", cost.time.seconds},
           {"core_seconds", cost.time.core_seconds},
@@ -58,8 +57,7 @@ ArtifactCheck check_artifact(const fs::path& artifact, const fs::path& record_fi
   try {
     const Json record = read_sealed_json(record_file);
     for (const auto& [name, seal] : record.at("files").items()) {
-      verify_seal(name.empty() ? artifact : artifact / name,
-                  {seal.at("bytes").get<std::uint64_t>(), seal.at("xxh3_128").get<std::string>()},
+      verify_seal(name.empty() ? artifact : artifact / name, seal_of(seal),
                   record_file.filename().string());
     }
   } catch (const std::exception& error) {

@@ -7,8 +7,8 @@
 #include <set>
 
 #include "formats/atomic_file.h"
-#include "formats/content_hash.h"
 #include "formats/input_error.h"
+#include "formats/seal_json.h"
 #include "pipeline/chart/chart.h"
 #include "pipeline/chart/chart_page.h"
 #include "pipeline/commands.h"
@@ -143,11 +143,8 @@ class ChartMaker {
                                 record.at("processor") == processor_ &&
                                 record.at("program_version") == kProgramVersion;
       if (!same_machine) return {};
-      const Json& picture = record.at("picture");
-      verify_seal(
-          file(key + ".exr"),
-          {picture.at("bytes").get<std::uint64_t>(), picture.at("xxh3_128").get<std::string>()},
-          record_file.filename().string());
+      verify_seal(file(key + ".exr"), seal_of(record.at("picture")),
+                  record_file.filename().string());
       return record;
     } catch (const FileError& error) {
       context_->console->warn(fmt::format("{}; rendered again", error.what()));
@@ -172,9 +169,8 @@ class ChartMaker {
     write_png(file(key + ".png"), picture.image.width, picture.image.height,
               tone_map(layer_of(picture.image, "", key), 0));
     write_exr(file(key + ".exr"), picture.image);
-    const FileSeal seal = seal_of_file(file(key + ".exr"));
     const Json record = {{"key", key},
-                         {"picture", {{"bytes", seal.bytes}, {"xxh3_128", seal.xxh3_128}}},
+                         {"picture", json_of(seal_of_file(file(key + ".exr")))},
                          {"program_version", kProgramVersion},
                          {"processor", processor_},
                          {"threads", working_threads()},

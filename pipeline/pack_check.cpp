@@ -33,20 +33,6 @@ void check_origin(const fs::path& path) {
   }
 }
 
-void check_scattering(const FabricPack& pack) {
-  for (const FiberScattering& fiber : pack.exemplar.scattering) {
-    const auto is_share = [](const Rgbd& color) {
-      return (color >= 0).all() && (color <= 1).all();
-    };
-    if (!is_share(fiber.color_r) || !is_share(fiber.color_tt)) {
-      fail(pack, "fibers.safetensors", 6, "a fiber's colour is outside [0, 1]");
-    }
-    if (!fiber.isotropic_white && !(fiber.beta_r > 0 && fiber.beta_tt > 0 && fiber.gamma_tt > 0)) {
-      fail(pack, "fibers.safetensors", 6, "the width of a scattering lobe is not above 0");
-    }
-  }
-}
-
 void check_ssdf(const FabricPack& pack) {
   constexpr char kFile[] = "ssdf.safetensors";
   for (const float distance : pack.ssdf->mean) {
@@ -98,7 +84,6 @@ void check_volume(const FabricPack& pack) {
 }  // namespace
 
 void check_pack_contents(const FabricPack& pack) {
-  check_scattering(pack);
   if (pack.ssdf) check_ssdf(pack);
   if (pack.sgs) check_sgs(pack);
   if (pack.transfer) check_transfer(pack);

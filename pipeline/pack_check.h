@@ -4,8 +4,7 @@
 // fails is the message.
 //    1-4 the manifest and every file's size and checksum (fibers/baked/fabric_pack.h)
 //    5   every tensor file holds its stage, key, config and program version
-//    6   the fibers keep the invariants of an exemplar (fibers/cloth/exemplar.h), scattering widths
-//        and colours are in range
+//    6   the fibers keep the invariants of an exemplar (fibers/cloth/exemplar.h)
 //    7   what the readers ask: finite numbers, shapes that agree, flags 0 or 1, unit axes, weights
 //        not negative, one number of segments in all files, ids of existing segments
 //    8   signed distances: the mean lies within [-pi, pi]
@@ -21,8 +20,8 @@
 
 namespace heddle {
 
-/// Checks 6 (scattering) and 8 to 11, on a pack that has been opened. Throws FileError naming the
-/// file and the number of the check.
+/// Checks 8 to 11, on a pack that has been opened: its readers make 6 and 7. Throws FileError
+/// naming the file and the number of the check.
 void check_pack_contents(const FabricPack& pack);
 
 /// All checks.

@@ -33,7 +33,16 @@ namespace fs = std::filesystem;
 constexpr std::uint32_t kSegmentsPerChunk = 256;
 constexpr std::uint32_t kCellsPerChunk = 32;
 
-constexpr int kAccuracyVersion = 8;
+// Of every stage, and of the hash of the fibers' shapes. One whose algorithm or file layout changes
+// needs a new number: its key holds it, and what the old one made is then found no more.
+int version_of(std::string_view stage) {
+  static const std::map<std::string_view, int> versions = {
+      {"geometry", 1},        {"synth", 1},    {"maps", 3}, {"ssdf", 1},     {"sg", 1},
+      {"transfer", 4},        {"voxelize", 2}, {"pack", 1}, {"accuracy", 8}, {"surface-maps", 1},
+      {"surface-weights", 2},
+  };
+  return versions.at(stage);
+}
 
 void write_transfer_chunk(const fs::path& path, const TransferChunk& chunk, int order) {
   const auto cells = static_cast<std::uint64_t>(chunk.paths.size());
@@ -79,7 +88,7 @@ std::string hash_of_geometry(const Exemplar& exemplar) {
     return content_hash(std::as_bytes(std::span(values)));
   };
   return stage_key({"geometry",
-                    1,
+                    version_of("geometry"),
                     {{"tile_mm", fmt::format("{} {}", exemplar.width_mm, exemplar.height_mm)},
                      {"first_point", bytes_of(exemplar.first_point)},
                      {"points", bytes_of(exemplar.points)},
@@ -164,11 +173,11 @@ FabricStages::FabricStages(const fs::path& fabric_file, StageContext& context,
 
 FabricStages::~FabricStages() = default;
 
-Stage make_stage(std::string name, int version, std::string extension, const std::string& config,
+Stage make_stage(std::string name, std::string extension, const std::string& config,
                  std::vector<std::pair<std::string, std::string>> upstream) {
   upstream.emplace_back("config", config);
   Stage stage;
-  stage.key = stage_key({name, version, std::move(upstream)});
+  stage.key = stage_key({name, version_of(name), std::move(upstream)});
   stage.metadata = {{"stage", name},
                     {"key", stage.key},
                     {"config", config},
@@ -278,7 +287,7 @@ const std::string& FabricStages::geometry_key() {
 }
 
 Stage FabricStages::synth_stage() const {
-  return make_stage("synth", 1, ".safetensors", document_.cloth_text, {});
+  return make_stage("synth", ".safetensors", document_.cloth_text, {});
 }
 
 Artifact FabricStages::synth() {
@@ -407,7 +416,7 @@ Stage FabricStages::maps_stage() {
       {"light_from", light_from()},
       {"seed", fmt::format("{}", document_.config.seed)}};
   append_origins(upstream);
-  return make_stage("maps", 3, ".safetensors", "", std::move(upstream));
+  return make_stage("maps", ".safetensors", "", std::move(upstream));
 }
 
 /// Computes one chunk of maps.
@@ -459,17 +468,17 @@ void FabricStages::visibility_shard(Shard shard) {
   });
 }
 
-Stage FabricStages::fit_stage(const std::string& name, int version) {
+Stage FabricStages::fit_stage(const std::string& name) {
   return make_stage(
-      name, version, ".safetensors", document_.visibility_text,
+      name, ".safetensors", document_.visibility_text,
       {{"maps", maps_stage().key}, {"seed", fmt::format("{}", document_.config.seed)}});
 }
 
 Stage FabricStages::ssdf_stage() {
-  return fit_stage("ssdf", 1);
+  return fit_stage("ssdf");
 }
 Stage FabricStages::sg_stage() {
-  return fit_stage("sg", 1);
+  return fit_stage("sg");
 }
 
 Artifact FabricStages::ssdf() {
@@ -510,7 +519,7 @@ Stage FabricStages::transfer_stage(const TransferSettings& settings) {
       {"light_from", light_from()},
       {"seed", fmt::format("{}", settings.seed)}};
   append_origins(upstream);
-  return make_stage("transfer", 4, ".safetensors", document_.transfer_text, std::move(upstream));
+  return make_stage("transfer", ".safetensors", document_.transfer_text, std::move(upstream));
 }
 
 /// What the transfer stage and its shards need besides the settings.
@@ -565,7 +574,7 @@ Artifact FabricStages::transfer(std::optional<int> order) {
 }
 
 Stage FabricStages::volume_stage() {
-  return make_stage("voxelize", 2, ".vdb", document_.volume_text, {{"geometry", geometry_key()}});
+  return make_stage("voxelize", ".vdb", document_.volume_text, {{"geometry", geometry_key()}});
 }
 
 Artifact FabricStages::volume() {
@@ -586,7 +595,7 @@ Artifact FabricStages::pack(const Needs& needs) {
   }
   if (needs.volume) upstream.emplace_back("volume.vdb", volume_stage().key);
   upstream.emplace_back("light_from", light_from());
-  const Stage stage = make_stage("pack", 1, "", document_.config.name, std::move(upstream));
+  const Stage stage = make_stage("pack", "", document_.config.name, std::move(upstream));
   return artifact_of(
       stage, [&](const fs::path& folder, StageResult&) { fill_pack(folder, stage.key, needs); });
 }
@@ -618,7 +627,7 @@ void FabricStages::fill_pack(const fs::path& folder, const std::string& key, con
 Stage FabricStages::accuracy_stage(const SurfaceFabric* surface) {
   if (surface != nullptr) {
     return make_stage(
-        "accuracy", kAccuracyVersion, ".json", surface->text,
+        "accuracy", ".json", surface->text,
         {{"fibers", synth().key}, {"seed", fmt::format("{}", document_.config.seed)}});
   }
   std::vector<std::pair<std::string, std::string>> upstream;
@@ -626,7 +635,7 @@ Stage FabricStages::accuracy_stage(const SurfaceFabric* surface) {
                              transfer_stage(transfer_settings({})), volume_stage()}) {
     upstream.emplace_back(stage.name, stage.key);
   }
-  return make_stage("accuracy", kAccuracyVersion, ".json", "", std::move(upstream));
+  return make_stage("accuracy", ".json", "", std::move(upstream));
 }
 
 Artifact FabricStages::accuracy_place(const SurfaceFabric* surface) {

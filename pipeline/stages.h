@@ -144,7 +144,8 @@ struct Stage {
   std::string key;
   std::map<std::string, std::string> metadata;
 };
-Stage make_stage(std::string name, int version, std::string extension, const std::string& config,
+/// `name` is one of the table of versions in stages.cpp.
+Stage make_stage(std::string name, std::string extension, const std::string& config,
                  std::vector<std::pair<std::string, std::string>> upstream);
 
 /// Is the artifact in the cache, and as it was written? Reads all of it the first time. A broken
@@ -231,7 +232,7 @@ class FabricStages {
   void compute_maps(const Stage& stage, const std::filesystem::path& file, std::uint32_t first,
                     std::uint32_t end);
   Stage synth_stage() const;
-  Stage fit_stage(const std::string& name, int version);
+  Stage fit_stage(const std::string& name);
   Stage ssdf_stage();
   Stage sg_stage();
   Stage volume_stage();

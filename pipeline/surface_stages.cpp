@@ -53,7 +53,7 @@ std::string geometry_text(const SceneConfig& config,
 
 Stage maps_stage(const std::string& geometry, std::size_t cloth, ClothSide side) {
   return make_stage(
-      "surface-maps", 1, ".safetensors", geometry,
+      "surface-maps", ".safetensors", geometry,
       {{"cloth", fmt::format("{}", cloth)}, {"side", side == ClothSide::kFace ? "face" : "back"}});
 }
 
@@ -70,7 +70,7 @@ SurfaceStages::SurfaceStages(const SceneConfig& config, StageContext& context,
     if (cloth.surface_method != SurfaceMethod::kInteractive) continue;
     if (geometry.empty()) geometry = geometry_text(config, geometry_key);
     surfaces_.back() = Surface{&*cloth.surface,
-                               make_stage("surface-weights", 2, ".safetensors",
+                               make_stage("surface-weights", ".safetensors",
                                           weights_text(*cloth.surface->interactive, {}), {}),
                                maps_stage(geometry, index, ClothSide::kFace),
                                maps_stage(geometry, index, ClothSide::kBack)};

@@ -2,7 +2,7 @@
 
 #include <tbb/parallel_for.h>
 
-#include <Eigen/Dense>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cassert>
 #include <cmath>
@@ -10,6 +10,7 @@
 
 #include "fibers/math/random.h"
 #include "fibers/math/signed_distance.h"
+#include "fibers/math/symmetric_eigen.h"
 
 namespace heddle {
 namespace {
@@ -76,10 +77,10 @@ std::pair<Eigen::MatrixXd, Eigen::VectorXd> leading_eigenvectors(const Eigen::Ma
     orthonormal = qr.householderQ() * Eigen::MatrixXd::Identity(matrix.rows(), vectors);
     basis.noalias() = matrix * orthonormal;
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(orthonormal.transpose() * basis);
+  const SymmetricEigen within = symmetric_eigen(orthonormal.transpose() * basis);
   const Eigen::Index kept = std::min(count, vectors);
-  return {orthonormal * solver.eigenvectors().rowwise().reverse().leftCols(kept),
-          solver.eigenvalues().reverse().head(kept)};
+  return {orthonormal * within.vectors.rowwise().reverse().leftCols(kept),
+          within.values.reverse().head(kept)};
 }
 
 }  // namespace

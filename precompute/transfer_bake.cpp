@@ -26,22 +26,27 @@ constexpr int kFewestBatches = 4;
 
 using RowMajorMatrix = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
+constexpr int kConeColumns = ConeTransfer::kWidths * ConeTransfer::kAzimuths * 3;
+
 }  // namespace
 
 TransferSettings read_transfer_settings(const TomlTable& section) {
   TransferSettings settings;
-  settings.order = static_cast<int>(section.integer("order", 0, 5, 5));
-  settings.cell_mean_free_paths =
-      section.number("cell_mean_free_paths", {.min = 0.25, .max = 100}, 4.0);
-  settings.min_paths = static_cast<int>(section.integer("min_paths", 1, 100'000'000, 4096));
-  settings.max_paths = static_cast<int>(section.integer("max_paths", 1, 100'000'000, 32768));
+  settings.order = static_cast<int>(section.integer("order", 0, 5, settings.order));
+  settings.cell_mean_free_paths = section.number("cell_mean_free_paths", {.min = 0.25, .max = 100},
+                                                 settings.cell_mean_free_paths);
+  settings.min_paths =
+      static_cast<int>(section.integer("min_paths", 1, 100'000'000, settings.min_paths));
+  settings.max_paths =
+      static_cast<int>(section.integer("max_paths", 1, 100'000'000, settings.max_paths));
   if (settings.max_paths < settings.min_paths)
     section.fail("max_paths", "expected at least min_paths");
   const std::string cones = section.choice("cones", {"auto", "on", "off"}, "auto");
   settings.cones = cones == "auto" ? TransferSettings::Cones::kAuto
                    : cones == "on" ? TransferSettings::Cones::kOn
                                    : TransferSettings::Cones::kOff;
-  settings.target_error = section.number("target_error", {.min = 1e-4, .max = 1}, 0.02);
+  settings.target_error =
+      section.number("target_error", {.min = 1e-4, .max = 1}, settings.target_error);
   return settings;
 }
 
@@ -79,135 +84,179 @@ TransferBaker::TransferBaker(const TileScene& scene, std::span<const BcsdfTable>
   }
 }
 
-void TransferBaker::bake_cell(std::uint32_t cell, const CellResult& result) const {
+/// What the paths of one batch carried out of the cloth. Paths that stay on a cone fill the rows
+/// from the first on, all others from the last on.
+struct TransferBaker::Batch {
+  RowMajorMatrix light;     // Y_j0(w0) of each path
+  RowMajorMatrix incoming;  // throughput x Y_j1(w1)
+  RowMajorMatrix on_cones;  // throughput x F_m(phi) of the path's width
+  int narrow = 0;
+  int wide = 0;
+
+  Batch(int n, bool with_cones)
+      : light(kBatch, n),
+        incoming(kBatch, 3 * n),
+        on_cones(with_cones ? kBatch : 0, kConeColumns) {}
+
+  void clear() {
+    light.setZero();
+    incoming.setZero();
+    on_cones.setZero();
+    narrow = wide = 0;
+  }
+};
+
+/// Sums of the batches' means over one cell.
+struct TransferBaker::CellSums {
+  Eigen::ArrayXXd matrix;
+  Eigen::ArrayXXd squares;
+  Eigen::ArrayXXd cone_harmonics;  // of what stays on cones
+  Eigen::ArrayXXd cone_moments;
+  int batches = 0;
+
+  explicit CellSums(int n)
+      : matrix(Eigen::ArrayXXd::Zero(n, 3 * n)),
+        squares(Eigen::ArrayXXd::Zero(n, 3 * n)),
+        cone_harmonics(Eigen::ArrayXXd::Zero(n, 3 * n)),
+        cone_moments(Eigen::ArrayXXd::Zero(n, kConeColumns)) {}
+
+  void add(const Batch& batch) {
+    constexpr double kScale = 4 * kPi / kBatch;
+    const int wide = batch.wide;
+    const int narrow = batch.narrow;
+    Eigen::ArrayXXd mean =
+        (batch.light.bottomRows(wide).transpose() * batch.incoming.bottomRows(wide))
+            .array()
+            .cast<double>() *
+        kScale;
+    if (narrow > 0) {
+      const Eigen::ArrayXXd part =
+          (batch.light.topRows(narrow).transpose() * batch.incoming.topRows(narrow))
+              .array()
+              .cast<double>() *
+          kScale;
+      cone_harmonics += part;
+      cone_moments += (batch.light.topRows(narrow).transpose() * batch.on_cones.topRows(narrow))
+                          .array()
+                          .cast<double>() *
+                      kScale;
+      mean += part;
+    }
+    matrix += mean;
+    squares += mean.square();
+    ++batches;
+  }
+
+  Eigen::ArrayXXd average() const { return matrix / batches; }
+  Eigen::ArrayXXd squared_error() const {
+    return (squares / batches - average().square()).max(0.0) / static_cast<double>(batches - 1);
+  }
+};
+
+void TransferBaker::trace_batch(std::uint32_t cell, std::uint64_t first_path, Batch& batch) const {
   const auto& [segments, cumulative_openness] = cells_[cell];
   const int n = (settings_.order + 1) * (settings_.order + 1);
   const TileTrace trace(*scene_);
   const WalkLimits limits;
-
-  Eigen::ArrayXXd sum = Eigen::ArrayXXd::Zero(n, 3 * n);
-  Eigen::ArrayXXd sum_of_squares = Eigen::ArrayXXd::Zero(n, 3 * n);
-  // Paths that stay on a cone fill the rows from the first on, all others from the last on.
-  RowMajorMatrix light(kBatch, n);         // Y_j0(w0) of each path
-  RowMajorMatrix incoming(kBatch, 3 * n);  // throughput x Y_j1(w1)
-  constexpr int kConeColumns = ConeTransfer::kWidths * ConeTransfer::kAzimuths * 3;
-  const bool with_cones = !bundle_tangent_.empty();
-  // throughput x F_m(phi) of the path's width
-  RowMajorMatrix on_cones(with_cones ? kBatch : 0, kConeColumns);
-  Eigen::ArrayXXd harmonics_sum = Eigen::ArrayXXd::Zero(n, 3 * n);
-  Eigen::ArrayXXd moments_sum = Eigen::ArrayXXd::Zero(n, kConeColumns);
   std::vector<float> y1(static_cast<std::size_t>(n));
-  int batches = 0;
-  for (;;) {
-    light.setZero();
-    incoming.setZero();
-    on_cones.setZero();
-    int narrow = 0;
-    int wide = 0;
-    for (int i = 0; i < kBatch; ++i) {
-      const auto path =
-          static_cast<std::uint64_t>(batches) * kBatch + static_cast<std::uint64_t>(i);
-      RandomStream random(settings_.seed, RandomStage::kTransfer, cell, path);
-      const double share = std::fmod((static_cast<double>(path) + 0.5) * kGoldenShare, 1.0);
-      const auto chosen =
-          std::upper_bound(cumulative_openness.begin(), cumulative_openness.end() - 1,
-                           share * cumulative_openness.back());
-      const std::uint32_t segment =
-          segments[static_cast<std::size_t>(chosen - cumulative_openness.begin())];
-      const float z = 1 - 2 * (static_cast<float>(i / kStrata) + random.uniform()) / kStrata;
-      const float phi = 2 * kPif * (static_cast<float>(i % kStrata) + random.uniform()) / kStrata;
-      const float r = std::sqrt(std::max(0.0F, 1 - z * z));
-      const Vec3 w1(r * std::cos(phi), r * std::sin(phi), z);
+  batch.clear();
+  for (int i = 0; i < kBatch; ++i) {
+    const std::uint64_t path = first_path + static_cast<std::uint64_t>(i);
+    RandomStream random(settings_.seed, RandomStage::kTransfer, cell, path);
+    const double share = std::fmod((static_cast<double>(path) + 0.5) * kGoldenShare, 1.0);
+    const auto chosen = std::upper_bound(cumulative_openness.begin(), cumulative_openness.end() - 1,
+                                         share * cumulative_openness.back());
+    const std::uint32_t segment =
+        segments[static_cast<std::size_t>(chosen - cumulative_openness.begin())];
+    const float z = 1 - 2 * (static_cast<float>(i / kStrata) + random.uniform()) / kStrata;
+    const float phi = 2 * kPif * (static_cast<float>(i % kStrata) + random.uniform()) / kStrata;
+    const float r = std::sqrt(std::max(0.0F, 1 - z * z));
+    const Vec3 w1(r * std::cos(phi), r * std::sin(phi), z);
 
-      const auto first = trace.next(trace.at(origins_->position[segment], segment), w1);
-      if (!first) continue;
-      float bundle_variance = 0;
-      const auto escape = walk_path(
-          trace, materials_, *first, -w1, Rgb::Ones(), random, limits,
-          [&](const auto& vertex, const Mat3&, const Vec3&, const Rgb&, int) {
-            if (with_cones) {
-              bundle_variance += vertex.tangent.cross(bundle_tangent_[segment]).squaredNorm();
-            }
-            return true;
-          });
-      if (!escape || (!settings_.both_sides && escape->direction.z() <= 0)) continue;
-      const int width = with_cones ? ConeTransfer::width_of(escape->variance + bundle_variance)
+    const auto first = trace.next(trace.at(origins_->position[segment], segment), w1);
+    if (!first) continue;
+    float bundle_variance = 0;
+    const auto escape = walk_path(
+        trace, materials_, *first, -w1, Rgb::Ones(), random, limits,
+        [&](const auto& vertex, const Mat3&, const Vec3&, const Rgb&, int) {
+          if (with_cones()) {
+            bundle_variance += vertex.tangent.cross(bundle_tangent_[segment]).squaredNorm();
+          }
+          return true;
+        });
+    if (!escape || (!settings_.both_sides && escape->direction.z() <= 0)) continue;
+    const int width = with_cones() ? ConeTransfer::width_of(escape->variance + bundle_variance)
                                    : ConeTransfer::kWidths;
-      const bool on_cone = width < ConeTransfer::kWidths;
-      const int row = on_cone ? narrow++ : kBatch - 1 - wide++;
-      evaluate_sh(settings_.order, escape->direction, light.row(row).data());
-      evaluate_sh(settings_.order, w1, y1.data());
-      for (int j = 0; j < n; ++j) {
-        for (int c = 0; c < 3; ++c)
-          incoming(row, 3 * j + c) = escape->throughput[c] * y1[static_cast<std::size_t>(j)];
-      }
-      if (!on_cone) continue;
-      const Vec3 about = cone_frame(bundle_tangent_[segment]) * w1;
-      const float across = std::hypot(about.y(), about.z());
-      const auto azimuths = azimuth_harmonics(across > 0 ? about.y() / across : 1.0F,
-                                              across > 0 ? about.z() / across : 0.0F);
-      for (int m = 0; m < ConeTransfer::kAzimuths; ++m) {
-        for (int c = 0; c < 3; ++c) {
-          on_cones(row, 3 * (width * ConeTransfer::kAzimuths + m) + c) =
-              escape->throughput[c] * azimuths[static_cast<std::size_t>(m)];
-        }
-      }
+    const bool on_cone = width < ConeTransfer::kWidths;
+    const int row = on_cone ? batch.narrow++ : kBatch - 1 - batch.wide++;
+    evaluate_sh(settings_.order, escape->direction, batch.light.row(row).data());
+    evaluate_sh(settings_.order, w1, y1.data());
+    for (int j = 0; j < n; ++j) {
+      for (int c = 0; c < 3; ++c)
+        batch.incoming(row, 3 * j + c) = escape->throughput[c] * y1[static_cast<std::size_t>(j)];
     }
-    constexpr double kScale = 4 * kPi / kBatch;
-    Eigen::ArrayXXd mean =
-        (light.bottomRows(wide).transpose() * incoming.bottomRows(wide)).array().cast<double>() *
-        kScale;
-    if (narrow > 0) {
-      const Eigen::ArrayXXd part =
-          (light.topRows(narrow).transpose() * incoming.topRows(narrow)).array().cast<double>() *
-          kScale;
-      harmonics_sum += part;
-      moments_sum +=
-          (light.topRows(narrow).transpose() * on_cones.topRows(narrow)).array().cast<double>() *
-          kScale;
-      mean += part;
-    }
-    sum += mean;
-    sum_of_squares += mean.square();
-    ++batches;
-
-    const bool enough = batches * kBatch >= settings_.min_paths && batches >= kFewestBatches;
-    const bool last = batches * kBatch >= settings_.max_paths && batches >= kFewestBatches;
-    if (!enough) continue;
-    const Eigen::ArrayXXd average = sum / batches;
-    const Eigen::ArrayXXd squared_error =
-        (sum_of_squares / batches - average.square()).max(0.0) / static_cast<double>(batches - 1);
-    const double brightest = average.row(0).head<3>().maxCoeff();
-    if (!last && squared_error.mean() > std::pow(settings_.target_error * brightest, 2)) continue;
-    for (int j0 = 0; j0 < n; ++j0) {
-      for (int k = 0; k < 3 * n; ++k)
-        result.matrix[j0 * 3 * n + k] = static_cast<float>(average(j0, k));
-    }
-    if (with_cones) {
-      constexpr int kWidthColumns = 3 * ConeTransfer::kAzimuths;
-      for (int j0 = 0; j0 < n; ++j0) {
-        for (int k = 0; k < 3 * n; ++k) {
-          result.cone_harmonics[j0 * 3 * n + k] =
-              static_cast<float>(harmonics_sum(j0, k) / batches);
-        }
-        for (int k = 0; k < kConeColumns; ++k) {
-          const int width = k / kWidthColumns;
-          result.cone_moments[(width * n + j0) * kWidthColumns + k % kWidthColumns] =
-              static_cast<float>(moments_sum(j0, k) / batches);
-        }
-      }
-    }
-    for (int l = 0; l <= settings_.order; ++l) {
+    if (!on_cone) continue;
+    const Vec3 about = cone_frame(bundle_tangent_[segment]) * w1;
+    const float across = std::hypot(about.y(), about.z());
+    const auto azimuths = azimuth_harmonics(across > 0 ? about.y() / across : 1.0F,
+                                            across > 0 ? about.z() / across : 0.0F);
+    for (int m = 0; m < ConeTransfer::kAzimuths; ++m) {
       for (int c = 0; c < 3; ++c) {
-        double band = 0;
-        for (int j1 = l * l; j1 < (l + 1) * (l + 1); ++j1)
-          band += squared_error.col(3 * j1 + c).sum();
-        result.standard_error[3 * l + c] = static_cast<float>(std::sqrt(band / (n * (2 * l + 1))));
+        batch.on_cones(row, 3 * (width * ConeTransfer::kAzimuths + m) + c) =
+            escape->throughput[c] * azimuths[static_cast<std::size_t>(m)];
       }
     }
-    *result.paths = static_cast<std::uint32_t>(batches * kBatch);
-    return;
   }
+}
+
+void TransferBaker::store(const CellSums& sums, const CellResult& result) const {
+  const int n = (settings_.order + 1) * (settings_.order + 1);
+  const Eigen::ArrayXXd average = sums.average();
+  for (int j0 = 0; j0 < n; ++j0) {
+    for (int k = 0; k < 3 * n; ++k)
+      result.matrix[j0 * 3 * n + k] = static_cast<float>(average(j0, k));
+  }
+  if (with_cones()) {
+    constexpr int kWidthColumns = 3 * ConeTransfer::kAzimuths;
+    for (int j0 = 0; j0 < n; ++j0) {
+      for (int k = 0; k < 3 * n; ++k) {
+        result.cone_harmonics[j0 * 3 * n + k] =
+            static_cast<float>(sums.cone_harmonics(j0, k) / sums.batches);
+      }
+      for (int k = 0; k < kConeColumns; ++k) {
+        const int width = k / kWidthColumns;
+        result.cone_moments[(width * n + j0) * kWidthColumns + k % kWidthColumns] =
+            static_cast<float>(sums.cone_moments(j0, k) / sums.batches);
+      }
+    }
+  }
+  const Eigen::ArrayXXd squared_error = sums.squared_error();
+  for (int l = 0; l <= settings_.order; ++l) {
+    for (int c = 0; c < 3; ++c) {
+      double band = 0;
+      for (int j1 = l * l; j1 < (l + 1) * (l + 1); ++j1)
+        band += squared_error.col(3 * j1 + c).sum();
+      result.standard_error[3 * l + c] = static_cast<float>(std::sqrt(band / (n * (2 * l + 1))));
+    }
+  }
+  *result.paths = static_cast<std::uint32_t>(sums.batches * kBatch);
+}
+
+void TransferBaker::bake_cell(std::uint32_t cell, const CellResult& result) const {
+  const int n = (settings_.order + 1) * (settings_.order + 1);
+  Batch batch(n, with_cones());
+  CellSums sums(n);
+  for (;;) {
+    trace_batch(cell, static_cast<std::uint64_t>(sums.batches) * kBatch, batch);
+    sums.add(batch);
+    const int paths = sums.batches * kBatch;
+    if (sums.batches < kFewestBatches || paths < settings_.min_paths) continue;
+    const double brightest = sums.average().row(0).head<3>().maxCoeff();
+    const bool too_noisy =
+        sums.squared_error().mean() > std::pow(settings_.target_error * brightest, 2);
+    if (paths >= settings_.max_paths || !too_noisy) break;
+  }
+  store(sums, result);
 }
 
 TransferChunk TransferBaker::bake(std::uint32_t first_cell, std::uint32_t last_cell) const {
@@ -222,7 +271,7 @@ TransferChunk TransferBaker::bake(std::uint32_t first_cell, std::uint32_t last_c
   chunk.standard_error.resize(count * bands);
   chunk.paths.resize(count);
   const std::size_t moments = ConeTransfer::kWidths * n * ConeTransfer::kAzimuths * 3;
-  if (!bundle_tangent_.empty()) {
+  if (with_cones()) {
     chunk.cones =
         ConeTransfer{std::vector<float>(count * matrix), std::vector<float>(count * moments)};
   }
@@ -241,7 +290,7 @@ Transfer TransferBaker::assemble(std::span<const TransferChunk> chunks) const {
   transfer.order = settings_.order;
   transfer.cell_of_segment = segment_cells_->cell_of_segment;
   transfer.both_sides = settings_.both_sides;
-  if (!bundle_tangent_.empty()) transfer.cones.emplace();
+  if (with_cones()) transfer.cones.emplace();
   const auto append = [](std::vector<float>& all, const std::vector<float>& some) {
     all.insert(all.end(), some.begin(), some.end());
   };

@@ -36,11 +36,11 @@ namespace heddle {
 
 struct TransferSettings {
   int order = 5;                    // SH bands 0 .. order, light and incoming alike
-  double cell_mean_free_paths = 1;  // as many cells as cubes of this edge, in mean free paths
-  int min_paths = 0;                // per cell, rounded up to whole batches
-  int max_paths = 0;
+  double cell_mean_free_paths = 4;  // as many cells as cubes of this edge, in mean free paths
+  int min_paths = 4096;             // per cell, rounded up to whole batches
+  int max_paths = 32768;
   // rms standard error of the matrix' entries relative to a[0][0], brightest colour
-  double target_error = 0;
+  double target_error = 0.02;
   enum class Cones : std::uint8_t { kAuto, kOn, kOff };
   // whether light that stays on cones is kept apart (fibers/baked/cone_transfer.h)
   Cones cones = Cones::kAuto;
@@ -92,7 +92,13 @@ class TransferBaker {
     float* cone_harmonics;  // null without cones
     float* cone_moments;
   };
+  struct Batch;
+  struct CellSums;
+  /// Traces the paths from `first_path` on.
+  void trace_batch(std::uint32_t cell, std::uint64_t first_path, Batch& batch) const;
+  void store(const CellSums& sums, const CellResult& result) const;
   void bake_cell(std::uint32_t cell, const CellResult& result) const;
+  bool with_cones() const { return !bundle_tangent_.empty(); }
 
   const TileScene* scene_;
   std::span<const BcsdfTable> materials_;

@@ -7,7 +7,7 @@
 #include <cassert>
 #include <cmath>
 
-#include "formats/input_error.h"
+#include "fibers/baked/light_from.h"
 #include "formats/tensor_file.h"
 
 namespace heddle {
@@ -241,7 +241,7 @@ void write_visibility_maps(const std::filesystem::path& path, const VisibilityMa
   TensorFileWriter file;
   for (const auto& [key, value] : metadata) file.set_metadata(key, value);
   file.set_metadata("kind", "visibility maps");
-  file.set_metadata("light_from", maps.both_sides ? "both" : "face");
+  set_light_from(file, maps.both_sides);
   const std::array<std::uint32_t, 1> first = {maps.first_segment};
   file.add<std::uint32_t>("first_segment", {1}, first);
   file.add<std::uint64_t>("maps", {maps.count(), maps.words_per_map()}, maps.words);
@@ -251,10 +251,7 @@ void write_visibility_maps(const std::filesystem::path& path, const VisibilityMa
 VisibilityMaps read_visibility_maps(const std::filesystem::path& path) {
   const TensorFile file = TensorFile::read(path);
   VisibilityMaps maps;
-  const std::string& sides = file.metadata_value("light_from");
-  if (sides != "face" && sides != "both")
-    throw FileError(path.string() + ": light_from is neither face nor both");
-  maps.both_sides = sides == "both";
+  maps.both_sides = get_light_from(file);
   maps.first_segment = file.get<std::uint32_t>("first_segment", {1})[0];
   maps.words = file.get<std::uint64_t>("maps", {0, maps.words_per_map()});
   const std::size_t count = maps.words.size() / maps.words_per_map();

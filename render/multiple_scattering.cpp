@@ -8,6 +8,7 @@
 #include "fibers/math/sampling.h"
 #include "fibers/math/sh_rotation.h"
 #include "fibers/math/special_functions.h"
+#include "fibers/math/spherical_gaussian.h"
 
 namespace heddle {
 
@@ -65,12 +66,6 @@ const Circle& circle() {
   return points;
 }
 
-// Inverse of the distribution of cos(angle to the axis) under a normalised spherical Gaussian.
-double cosine_of_share(double share, double sharpness) {
-  if (sharpness < 1e-4) return 1 - 2 * share;
-  return 1 + std::log1p(-share * -std::expm1(-2 * sharpness)) / sharpness;
-}
-
 }  // namespace
 
 MultipleScattering::LightShape::LightShape(std::optional<float> sharpness, FaceLight face_light)
@@ -93,7 +88,7 @@ MultipleScattering::LightShape::LightShape(std::optional<float> sharpness, FaceL
     const Vec3d side(std::cos(inclination), 0, -std::sin(inclination));
     std::array<double, kCount> sum{};
     for (int p = 0; p < kPolar; ++p) {
-      const double cosine = cosine_of_share((p + 0.5) / kPolar, *sharpness);
+      const double cosine = 1 - sg_depth_of_share((p + 0.5) / kPolar, *sharpness);
       const double sine = std::sqrt(std::max(0.0, 1 - cosine * cosine));
       for (int a = 0; a < kAzimuths; ++a) {
         const double azimuth = 2 * kPi * (a + 0.5) / kAzimuths;

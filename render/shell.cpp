@@ -102,7 +102,13 @@ Shell::Shell(const ClothMesh& mesh, double z_min, double z_max)
       fabric_.emplace_back(mesh.fabric[v].x(), mesh.fabric[v].y(), z);
     }
   }
+  cut_prisms();
+  map_tets();
+  connect_tets();
+  connect_triangles();
+}
 
+void Shell::cut_prisms() {
   double volume = 0;
   for (std::array<std::uint32_t, 3> t : triangles_) {
     // Vertices in ascending order; is_odd where that reverses the triangle's winding.
@@ -129,7 +135,9 @@ Shell::Shell(const ClothMesh& mesh, double z_min, double z_max)
   if (volume < 0) {
     for (Tet& tet : tets_) std::swap(tet.vertex[2], tet.vertex[3]);
   }
+}
 
+void Shell::map_tets() {
   for (const Tet& tet : tets_) {
     const Mat3d world = edges(world_, tet.vertex);
     const Mat3d fabric = edges(fabric_, tet.vertex);
@@ -145,7 +153,9 @@ Shell::Shell(const ClothMesh& mesh, double z_min, double z_max)
     degenerate_count_ += degenerate ? 1 : 0;
     flipped_count_ += flipped ? 1 : 0;
   }
+}
 
+void Shell::connect_tets() {
   // Faces with the same three vertices belong together; where not exactly two meet, the shell is
   // open.
   struct Face {
@@ -177,8 +187,9 @@ Shell::Shell(const ClothMesh& mesh, double z_min, double z_max)
     first = last;
   }
   std::sort(boundary_faces_.begin(), boundary_faces_.end());
+}
 
-  // The same for the edges of the surface.
+void Shell::connect_triangles() {
   std::map<std::pair<std::uint32_t, std::uint32_t>,
            std::vector<std::pair<std::uint32_t, std::size_t>>>
       edge_sides;

@@ -158,6 +158,13 @@ class Shell {
     Vec3d fabric;
   };
 
+  // The constructor's steps: three tetrahedra for each triangle; their maps; what lies behind their
+  // faces; what lies behind the edges of the triangles.
+  void cut_prisms();
+  void map_tets();
+  void connect_tets();
+  void connect_triangles();
+
   // Barycentric coordinates of a fabric position in a triangle; not finite where that has no area.
   Vec3d weights_in(std::uint32_t triangle, const Eigen::Vector2d& fabric_xy) const;
   static RayFrame ray_frame(const Vec3d& origin, const Vec3d& direction);

@@ -11,6 +11,7 @@
 #include "formats/atomic_file.h"
 #include "formats/input_error.h"
 #include "formats/json_text.h"
+#include "formats/seal_json.h"
 
 namespace heddle {
 namespace {
@@ -38,9 +39,7 @@ std::string manifest_checksum(Json document) {
 
 Json to_json(const PackManifest& manifest) {
   Json files = Json::object();
-  for (const auto& [name, file] : manifest.files) {
-    files[name] = {{"bytes", file.bytes}, {"xxh3_128", file.xxh3_128}};
-  }
+  for (const auto& [name, seal] : manifest.files) files[name] = json_of(seal);
   Json document = {{"format", kFormatName},
                    {"version", kFormatVersion},
                    {"name", manifest.name},
@@ -71,10 +70,8 @@ PackManifest from_json(const Json& document, const std::string& path) {
   manifest.program_version = document.at("program_version").get<std::string>();
   manifest.light_from_both_sides = document.at("light_from") == "both";
   manifest.counts = document.at("counts").get<std::map<std::string, std::uint64_t>>();
-  for (const auto& [name, file] : document.at("files").items()) {
-    manifest.files[name] = {file.at("bytes").get<std::uint64_t>(),
-                            file.at("xxh3_128").get<std::string>()};
-  }
+  for (const auto& [name, seal] : document.at("files").items())
+    manifest.files[name] = seal_of(seal);
   return manifest;
 }
 

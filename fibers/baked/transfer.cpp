@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "fibers/baked/light_from.h"
 #include "formats/input_error.h"
 #include "formats/tensor_file.h"
 
@@ -98,7 +99,7 @@ void write_transfer(const std::filesystem::path& path, const Transfer& t,
   TensorFileWriter file;
   for (const auto& [key, value] : metadata) file.set_metadata(key, value);
   file.set_metadata("kind", "transfer");
-  file.set_metadata("light_from", t.both_sides ? "both" : "face");
+  set_light_from(file, t.both_sides);
   file.add<std::uint32_t>("cell_of_segment", {t.cell_of_segment.size()}, t.cell_of_segment);
   file.add<float>("matrices", {t.cell_count(), n, n, 3}, t.matrices);
   file.add<float>("standard_error", {t.cell_count(), bands, 3}, t.standard_error);
@@ -110,10 +111,7 @@ void write_transfer(const std::filesystem::path& path, const Transfer& t,
 Transfer read_transfer(const std::filesystem::path& path) {
   const TensorFile file = TensorFile::read(path);
   Transfer t;
-  const std::string& sides = file.metadata_value("light_from");
-  if (sides != "face" && sides != "both")
-    throw FileError(path.string() + ": light_from is neither face nor both");
-  t.both_sides = sides == "both";
+  t.both_sides = get_light_from(file);
   const std::uint64_t count = file.get<std::uint32_t>("paths", {0}).size();
   if (count == 0) throw FileError(path.string() + ": no cells");
   const std::vector<std::uint64_t>& error_shape = file.shape("standard_error");

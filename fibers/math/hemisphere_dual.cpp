@@ -1,10 +1,10 @@
 #include "fibers/math/hemisphere_dual.h"
 
-#include <Eigen/Eigenvalues>
 #include <cassert>
 #include <cmath>
 
 #include "fibers/math/quadrature.h"
+#include "fibers/math/symmetric_eigen.h"
 
 namespace heddle {
 
@@ -24,11 +24,11 @@ HemisphereDual::HemisphereDual(int order) : order_(order) {
         values[i] = y[static_cast<std::size_t>((m + i) * (m + i + 1) + m)];
       gram += rule.weights[k] * (m == 0 ? 2 : 1) * kPi * values * values.transpose();
     }
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(gram);
-    Eigen::VectorXd inverse = solver.eigenvalues();
+    const SymmetricEigen eigen = symmetric_eigen(gram);
+    Eigen::VectorXd inverse = eigen.values;
     for (int i = 0; i < n; ++i) inverse[i] = inverse[i] < kLeastShare ? 0.0 : 1 / inverse[i];
     const Eigen::MatrixXd block =
-        solver.eigenvectors() * inverse.asDiagonal() * solver.eigenvectors().transpose();
+        eigen.vectors * inverse.asDiagonal() * eigen.vectors.transpose();
     std::vector<float>& stored = blocks_[static_cast<std::size_t>(m)];
     for (int row = 0; row < n; ++row) {
       for (int column = 0; column < n; ++column)

@@ -1,12 +1,12 @@
 #include "fibers/math/quadrature.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cassert>
 #include <cmath>
 #include <map>
 #include <mutex>
 
+#include "fibers/math/symmetric_eigen.h"
 #include "fibers/math/vector.h"
 
 namespace heddle {
@@ -43,12 +43,11 @@ QuadratureRule make_gauss_legendre(int count) {
 // of the eigenvectors give the weights.
 QuadratureRule from_jacobi_matrix(const Eigen::VectorXd& diagonal,
                                   const Eigen::VectorXd& off_diagonal, double mass) {
-  Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver;
-  solver.computeFromTridiagonal(diagonal, off_diagonal, Eigen::ComputeEigenvectors);
+  const SymmetricEigen eigen = symmetric_eigen(diagonal, off_diagonal);
   QuadratureRule rule;
   for (Eigen::Index k = 0; k < diagonal.size(); ++k) {
-    rule.nodes.push_back(solver.eigenvalues()[k]);
-    const double first = solver.eigenvectors()(0, k);
+    rule.nodes.push_back(eigen.values[k]);
+    const double first = eigen.vectors(0, k);
     rule.weights.push_back(mass * first * first);
   }
   return rule;

@@ -40,10 +40,7 @@ Vec2 sample_disk(RandomStream& random) {
 
 Vec3 sample_spherical_gaussian(const Vec3& axis, float sharpness, RandomStream& random) {
   // 1 - cosine to the axis, by inversion; the double uniform keeps the tail at any sharpness.
-  const double lambda = sharpness;
-  const double u = random.uniform_double();
-  const double drop =
-      lambda > 0.0 ? std::min(2.0, -std::log1p(u * std::expm1(-2.0 * lambda)) / lambda) : 2.0 * u;
+  const double drop = sg_depth_of_share(random.uniform_double(), sharpness);
   const auto radius = static_cast<float>(std::sqrt(drop * (2.0 - drop)));
   const float phi = 2.0F * kPif * random.uniform();
   const Vec3 local(static_cast<float>(1.0 - drop), radius * std::cos(phi), radius * std::sin(phi));

@@ -1,6 +1,7 @@
 #include "fibers/math/signed_distance.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -116,6 +117,97 @@ SignedDistanceTransform::SignedDistanceTransform(int resolution) : grid_(resolut
   }
 }
 
+namespace {
+
+// The sides of cells along meridians that lie between open and closed.
+struct MeridianSides {
+  std::size_t padded;
+  std::size_t margin;
+  // [row][meridian] 0 where there is a side, otherwise kFar; each row goes on `margin` past both
+  // ends, so that it need not wrap
+  std::vector<float> side;
+  std::vector<std::uint8_t> row_has_any;  // [row + 1]
+
+  MeridianSides(const std::vector<std::uint8_t>& open, std::size_t n, std::size_t past_ends)
+      : padded(n + 2 * past_ends + 1), margin(past_ends), side(n * padded), row_has_any(n + 2, 0) {
+    for (std::size_t row = 0; row < n; ++row) {
+      float* const sides = &side[row * padded];
+      const std::uint8_t* const cells = &open[row * n];
+      for (std::size_t b = 0; b < n; ++b) {
+        const bool differ = cells[b] != cells[b == 0 ? n - 1 : b - 1];
+        sides[margin + b] = differ ? 0 : kFar;
+        row_has_any[row + 1] |= differ ? 1 : 0;
+      }
+      for (std::size_t b = 0; b < margin; ++b) sides[b] = sides[b + n];
+      for (std::size_t b = 0; b <= margin; ++b) sides[n + margin + b] = sides[margin + b];
+    }
+  }
+
+  /// The sides of a row from meridian 0 on; from -margin to n + margin.
+  const float* in_row(std::size_t row) const { return &side[row * padded + margin]; }
+};
+
+// How far, in half columns, the nearest corner or parallel side is from each column's middle.
+// corner: [meridian]; side: [column] whether it has a parallel side. Twice around either way.
+void count_half_columns(const std::vector<std::uint8_t>& corner,
+                        const std::vector<std::uint8_t>& side, std::vector<int>& half_columns) {
+  const std::size_t n = corner.size();
+  // Column c has meridian c at its beginning and c + 1 at its end.
+  int since = 2 * static_cast<int>(n);
+  for (std::size_t pass = 0; pass < 2; ++pass) {
+    for (std::size_t c = 0; c < n; ++c) {
+      since = corner[c] != 0 ? 1 : since + 2;
+      half_columns[c] = since;
+    }
+  }
+  since = 2 * static_cast<int>(n);
+  for (std::size_t pass = 0; pass < 2; ++pass) {
+    for (std::size_t c = n; c-- > 0;) {
+      since = corner[c + 1 == n ? 0 : c + 1] != 0 ? 1 : since + 2;
+      half_columns[c] = side[c] != 0 ? 0 : std::min(half_columns[c], since);
+    }
+  }
+}
+
+// The parallels that have a corner or a side.
+struct ParallelCorners {
+  std::vector<std::size_t> parallels;
+  std::vector<float> nearest_azimuth;  // [parallel that has any][column] 1 - cos of the azimuth
+
+  /// azimuth: [half columns] 1 - cos.
+  ParallelCorners(const std::vector<std::uint8_t>& open, const MeridianSides& meridians,
+                  std::size_t n, const std::vector<float>& azimuth) {
+    std::vector<std::uint8_t> corner(n);
+    std::vector<std::uint8_t> above(n);
+    std::vector<int> half_columns(n);
+    nearest_azimuth.reserve((n + 1) * n);
+    for (std::size_t parallel = 0; parallel <= n; ++parallel) {
+      const bool inner = parallel > 0 && parallel < n;
+      bool any = meridians.row_has_any[parallel] != 0 || meridians.row_has_any[parallel + 1] != 0;
+      for (std::size_t c = 0; c < n; ++c) {
+        above[c] = inner ? open[parallel * n + c] ^ open[(parallel - 1) * n + c] : 0;
+        any |= above[c] != 0;
+      }
+      if (!any) continue;
+      for (std::size_t b = 0; b < n; ++b) {
+        const std::size_t previous = b == 0 ? n - 1 : b - 1;
+        bool is_corner = above[b] != 0 || above[previous] != 0;
+        if (parallel > 0) is_corner |= meridians.in_row(parallel - 1)[b] == 0;
+        if (parallel < n) is_corner |= meridians.in_row(parallel)[b] == 0;
+        corner[b] = is_corner ? 1 : 0;
+      }
+      count_half_columns(corner, above, half_columns);
+      parallels.push_back(parallel);
+      for (std::size_t c = 0; c < n; ++c) {
+        nearest_azimuth.push_back(
+            azimuth[static_cast<std::size_t>(std::min(half_columns[c], static_cast<int>(n)))]);
+      }
+    }
+  }
+};
+
+}  // namespace
+
 void SignedDistanceTransform::operator()(const SphericalMap& map, float* distance) const {
   assert(map.resolution() == grid_.resolution());
   const int n = grid_.resolution();
@@ -124,73 +216,15 @@ void SignedDistanceTransform::operator()(const SphericalMap& map, float* distanc
   for (int row = 0, i = 0; row < n; ++row) {
     for (int column = 0; column < n; ++column, ++i) open[i] = map.open(row, column) ? 1 : 0;
   }
-
-  // Meridian sides as 0 or kFar, [row][meridian], each row continued past both ends so that it need
-  // not wrap.
-  const std::size_t margin = static_cast<std::size_t>(foot_offsets_);
-  const std::size_t padded = un + 2 * margin + 1;
-  std::vector<float> meridian_side(un * padded);
-  std::vector<std::uint8_t> row_has_meridian(un + 2, 0);  // [row + 1]
-  for (std::size_t row = 0; row < un; ++row) {
-    float* const sides = &meridian_side[row * padded];
-    const std::uint8_t* const cells = &open[row * un];
-    for (std::size_t b = 0; b < un; ++b) {
-      const bool side = cells[b] != cells[b == 0 ? un - 1 : b - 1];
-      sides[margin + b] = side ? 0 : kFar;
-      row_has_meridian[row + 1] |= side ? 1 : 0;
-    }
-    for (std::size_t b = 0; b < margin; ++b) sides[b] = sides[b + un];
-    for (std::size_t b = 0; b <= margin; ++b) sides[un + margin + b] = sides[margin + b];
-  }
-
-  // 1 - cos of the azimuth to the nearest corner or parallel side, [parallel that has any][column].
-  std::vector<float> nearest_azimuth;
-  std::vector<std::size_t> parallels;
-  std::vector<std::uint8_t> corner(un);
-  std::vector<std::uint8_t> above(un);
-  std::vector<int> half_columns(un);
-  nearest_azimuth.reserve((un + 1) * un);
-  for (std::size_t parallel = 0; parallel <= un; ++parallel) {
-    const bool inner = parallel > 0 && parallel < un;
-    bool any = row_has_meridian[parallel] != 0 || row_has_meridian[parallel + 1] != 0;
-    for (std::size_t c = 0; c < un; ++c) {
-      above[c] = inner ? open[parallel * un + c] ^ open[(parallel - 1) * un + c] : 0;
-      any |= above[c] != 0;
-    }
-    if (!any) continue;
-    for (std::size_t b = 0; b < un; ++b) {
-      const std::size_t previous = b == 0 ? un - 1 : b - 1;
-      bool is_corner = above[b] != 0 || above[previous] != 0;
-      if (parallel > 0) is_corner |= meridian_side[(parallel - 1) * padded + margin + b] == 0;
-      if (parallel < un) is_corner |= meridian_side[parallel * padded + margin + b] == 0;
-      corner[b] = is_corner ? 1 : 0;
-    }
-    // Twice around either way; column c has meridian c at its beginning and c + 1 at its end.
-    int since = 2 * n;
-    for (std::size_t pass = 0; pass < 2; ++pass) {
-      for (std::size_t c = 0; c < un; ++c) {
-        since = corner[c] != 0 ? 1 : since + 2;
-        half_columns[c] = since;
-      }
-    }
-    since = 2 * n;
-    for (std::size_t pass = 0; pass < 2; ++pass) {
-      for (std::size_t c = un; c-- > 0;) {
-        since = corner[c + 1 == un ? 0 : c + 1] != 0 ? 1 : since + 2;
-        half_columns[c] = above[c] != 0 ? 0 : std::min(half_columns[c], since);
-      }
-    }
-    parallels.push_back(parallel);
-    for (std::size_t c = 0; c < un; ++c) {
-      nearest_azimuth.push_back(azimuth_[static_cast<std::size_t>(std::min(half_columns[c], n))]);
-    }
-  }
-
+  const MeridianSides meridians(open, un, static_cast<std::size_t>(foot_offsets_));
+  const ParallelCorners corners(open, meridians, un, azimuth_);
+  const std::vector<std::size_t>& parallels = corners.parallels;
   if (parallels.empty()) {
     std::fill(distance, distance + un * un, open[0] != 0 ? kPif : -kPif);
     return;
   }
 
+  // To corners and parallel sides.
   std::fill(distance, distance + un * un, kFar);
   // Blocks of columns that keep all parallels in the first-level cache and one row's minimum in
   // registers.
@@ -203,7 +237,7 @@ void SignedDistanceTransform::operator()(const SphericalMap& map, float* distanc
       for (std::size_t i = 0; i < parallels.size(); ++i) {
         const float polar = polar_[row * (un + 1) + parallels[i]];
         const float product = product_[row * (un + 1) + parallels[i]];
-        const float* const azimuth = &nearest_azimuth[i * un + begin];
+        const float* const azimuth = &corners.nearest_azimuth[i * un + begin];
         if (width == kBlock) {
           for (std::size_t c = 0; c < kBlock; ++c)
             nearest[c] = std::min(nearest[c], polar + product * azimuth[c]);
@@ -216,15 +250,17 @@ void SignedDistanceTransform::operator()(const SphericalMap& map, float* distanc
     }
   }
 
+  // To feet on meridian sides.
+  const std::size_t margin = meridians.margin;
   for (std::size_t row = 0; row < un; ++row) {
     float* const nearest = distance + row * un;
     for (std::size_t offset = 0; offset < margin; ++offset) {
       const float foot = foot_[row * margin + offset];
       const auto foot_row = static_cast<std::size_t>(foot_row_[row * margin + offset]);
-      if (row_has_meridian[foot_row + 1] == 0) continue;
+      if (meridians.row_has_any[foot_row + 1] == 0) continue;
       // Meridians on either side of column c: c - offset and c + 1 + offset.
-      const float* const left = &meridian_side[foot_row * padded + margin - offset];
-      const float* const right = &meridian_side[foot_row * padded + margin + 1 + offset];
+      const float* const left = meridians.in_row(foot_row) - offset;
+      const float* const right = meridians.in_row(foot_row) + 1 + offset;
       for (std::size_t c = 0; c < un; ++c)
         nearest[c] = std::min(nearest[c], foot + std::min(left[c], right[c]));
     }

@@ -1,11 +1,21 @@
 #include "fibers/math/spherical_gaussian.h"
 
+#include <algorithm>
 #include <cassert>
 #include <cmath>
 
 #include "fibers/math/special_functions.h"
 
 namespace heddle {
+
+namespace {
+
+// Up to this sharpness the distribution is the uniform one, share = depth / 2: the two differ by
+// the factor 1 + sharpness (1 - share) to first order, which rounds to 1. Above, expm1 and log1p
+// lose nothing, however small the sharpness.
+constexpr double kUniform = 1e-16;
+
+}  // namespace
 
 double sg_value(const SphericalGaussian& gaussian, const Vec3d& direction) {
   return std::exp(-0.5 * gaussian.sharpness * (direction - gaussian.axis).squaredNorm());
@@ -19,6 +29,16 @@ double sg_mass(double sharpness) {
 
 float sg_mass(float sharpness) {
   return static_cast<float>(sg_mass(static_cast<double>(sharpness)));
+}
+
+double sg_share_within(double depth, double sharpness) {
+  if (sharpness <= kUniform) return 0.5 * depth;
+  return std::expm1(-sharpness * depth) / std::expm1(-2.0 * sharpness);
+}
+
+double sg_depth_of_share(double share, double sharpness) {
+  if (sharpness <= kUniform) return 2.0 * share;
+  return std::min(2.0, -std::log1p(share * std::expm1(-2.0 * sharpness)) / sharpness);
 }
 
 SgProduct sg_product(const SphericalGaussian& a, const SphericalGaussian& b) {

@@ -24,6 +24,13 @@ double sg_value(const SphericalGaussian& gaussian, const Vec3d& direction);
 double sg_mass(double sharpness);
 float sg_mass(float sharpness);
 
+/// Share of the mass that lies within `depth` = 1 - cosine of the axis; depth from 0 to 2.
+double sg_share_within(double depth, double sharpness);
+
+/// The inverse: 1 - cosine of the angle within which `share` of the mass lies; share from 0 to 1.
+/// Exact to the rounding of `share`, for any sharpness.
+double sg_depth_of_share(double share, double sharpness);
+
 /// a(w) b(w) = exp(log_scale) G(w; gaussian).
 struct SgProduct {
   SphericalGaussian gaussian;

@@ -293,28 +293,27 @@ std::array<BcsdfTable::LobeResponse, 2> BcsdfTable::sg_scatter_by_lobe(const Vec
   return lobes;
 }
 
-BcsdfTable::SgSums BcsdfTable::sg_sums(const Inclination& light, float sharpness,
-                                       const Inclination& view) const {
-  constexpr int kLanes = 8;
-  constexpr int kMaxNodes = 2 * kBroadNodes;
-  using Lanes = Eigen::Array<float, kLanes, 1>;
-  const float gap = -view.theta - light.theta;  // from theta' to the cone
+// Nodes of both lobes' integrals over theta, R's first. Angles are measured from the centres of the
+// two Gaussians, where they are small.
+struct BcsdfTable::SgNodes {
+  static constexpr int kMost = 2 * kBroadNodes;
+  std::array<float, kMost> from_light;  // theta - theta'
+  std::array<float, kMost> from_cone;   // theta + theta_o
+  std::array<float, kMost> weight;
+  std::array<float, kMost> square;  // x^2 of the rule's weight exp(-x^2)
+  int count = 0;
 
-  // Nodes of both lobes, R's first. E is kept relative to the lobe's centre, where angles are
-  // small.
-  std::array<float, kMaxNodes> from_light;  // theta - theta'
-  std::array<float, kMaxNodes> from_cone;   // theta + theta_o
-  std::array<float, kMaxNodes> weight;
-  std::array<float, kMaxNodes> square;  // x^2 of the rule's weight exp(-x^2)
-  int nodes = 0;
-  const auto add_node = [&](float light_offset, float cone_offset, float w, float x2) {
-    const auto n = static_cast<std::size_t>(nodes++);
+  void add(float light_offset, float cone_offset, float w, float x2) {
+    const auto n = static_cast<std::size_t>(count++);
     from_light[n] = light_offset;
     from_cone[n] = cone_offset;
     weight[n] = w;
     square[n] = x2;
-  };
-  const auto add_lobe = [&](float inverse_variance) {
+  }
+
+  void add_lobe(float inverse_variance, const Inclination& light, float sharpness,
+                const Inclination& view) {
+    const float gap = -view.theta - light.theta;  // from theta' to the cone
     const float total = inverse_variance + sharpness;
     // 1 - cos(d) >= 2 d^2 / pi^2 bounds the peak of exp(E) from above.
     const float slack = sharpness * (4.0F / (kPif * kPif));
@@ -323,8 +322,8 @@ BcsdfTable::SgSums BcsdfTable::sg_sums(const Inclination& light, float sharpness
       static const QuadratureRule& base = gauss_legendre(kBroadNodes);
       for (std::size_t n = 0; n < base.nodes.size(); ++n) {
         const float theta = kHalfPi * static_cast<float>(base.nodes[n]);
-        add_node(theta - light.theta, theta + view.theta,
-                 kHalfPi * static_cast<float>(base.weights[n]), 0.0F);
+        add(theta - light.theta, theta + view.theta, kHalfPi * static_cast<float>(base.weights[n]),
+            0.0F);
       }
       return;
     }
@@ -337,16 +336,23 @@ BcsdfTable::SgSums BcsdfTable::sg_sums(const Inclination& light, float sharpness
     const ThreeNodeRule rule = cut_rule(static_cast<double>(root * (kHalfPi - std::abs(centre))));
     for (std::size_t n = 0; n < 3; ++n) {
       const auto x = static_cast<float>(rule.nodes[n]);
-      add_node(light_offset + scale * x, cone_offset + scale * x,
-               static_cast<float>(rule.weights[n]) / root, x * x);
+      add(light_offset + scale * x, cone_offset + scale * x,
+          static_cast<float>(rule.weights[n]) / root, x * x);
     }
-  };
-  add_lobe(r_.inverse_variance);
-  const int nodes_r = nodes;
-  if (!fiber_.isotropic_white) add_lobe(tt_.inverse_variance);
+  }
+};
+
+BcsdfTable::SgSums BcsdfTable::sg_sums(const Inclination& light, float sharpness,
+                                       const Inclination& view) const {
+  constexpr int kLanes = 8;
+  using Lanes = Eigen::Array<float, kLanes, 1>;
+  SgNodes nodes;
+  nodes.add_lobe(r_.inverse_variance, light, sharpness, view);
+  const int nodes_r = nodes.count;
+  if (!fiber_.isotropic_white) nodes.add_lobe(tt_.inverse_variance, light, sharpness, view);
   SgSums sums;
-  if (nodes == 0) return sums;
-  while (nodes % kLanes != 0) add_node(0.0F, 0.0F, 0.0F, 0.0F);
+  if (nodes.count == 0) return sums;
+  while (nodes.count % kLanes != 0) nodes.add(0.0F, 0.0F, 0.0F, 0.0F);
 
   const float sum2 = (light.azimuth + view.azimuth).squaredNorm();
   const float difference2 = (light.azimuth - view.azimuth).squaredNorm();
@@ -356,10 +362,10 @@ BcsdfTable::SgSums BcsdfTable::sg_sums(const Inclination& light, float sharpness
   float tt = 0.0F;
   std::array<float, 2> all = {};      // R's and TT's sums
   std::array<float, 2> shifted = {};  // times theta - theta'
-  for (int first = 0; first < nodes; first += kLanes) {
-    const Eigen::Map<const Lanes> d_light(&from_light[static_cast<std::size_t>(first)]);
-    const Eigen::Map<const Lanes> d_cone(&from_cone[static_cast<std::size_t>(first)]);
-    const Eigen::Map<const Lanes> x2(&square[static_cast<std::size_t>(first)]);
+  for (int first = 0; first < nodes.count; first += kLanes) {
+    const Eigen::Map<const Lanes> d_light(&nodes.from_light[static_cast<std::size_t>(first)]);
+    const Eigen::Map<const Lanes> d_cone(&nodes.from_cone[static_cast<std::size_t>(first)]);
+    const Eigen::Map<const Lanes> x2(&nodes.square[static_cast<std::size_t>(first)]);
     Lanes inverse_variance;
     Lanes k;
     for (int lane = 0; lane < kLanes; ++lane) {
@@ -381,7 +387,7 @@ BcsdfTable::SgSums BcsdfTable::sg_sums(const Inclination& light, float sharpness
     const Lanes schlick = (1.0F - cosine).square().square() * (1.0F - cosine);
     for (int lane = 0; lane < kLanes; ++lane) {
       const int n = first + lane;
-      const float v = weight[static_cast<std::size_t>(n)] * value[lane] * bessel(t[lane]);
+      const float v = nodes.weight[static_cast<std::size_t>(n)] * value[lane] * bessel(t[lane]);
       if (fiber_.isotropic_white) {
         r += v * (2.0F / kPif);
         all[0] += v;

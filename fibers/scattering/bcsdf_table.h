@@ -99,6 +99,7 @@ class BcsdfTable {
   };
   struct Inclination;
   struct Densities;
+  struct SgNodes;
   struct SgSums;
 
   static LongitudinalLobe longitudinal_lobe(double beta);

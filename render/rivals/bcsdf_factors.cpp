@@ -1,11 +1,11 @@
 #include "render/rivals/bcsdf_factors.h"
 
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <tuple>
 
 #include "fibers/math/special_functions.h"
+#include "fibers/math/symmetric_eigen.h"
 
 namespace heddle {
 namespace {
@@ -86,20 +86,20 @@ BcsdfFactors::BcsdfFactors(const FiberScattering& fiber, int terms, Matrix matri
 void BcsdfFactors::cut(const Block& both, const Block& tt, const std::vector<double>& mode_scales,
                        int terms, Matrix matrix, int c) {
   // What the blocks, which hold S cos(theta_i), are multiplied by on either side.
-  Eigen::ArrayXf left(thetas_);
-  Eigen::ArrayXf right(thetas_);
+  Eigen::ArrayXd left(thetas_);
+  Eigen::ArrayXd right(thetas_);
   for (int i = 0; i < thetas_; ++i) {
     const double cosine = std::cos(kPi * ((i + 0.5) / thetas_ - 0.5));
-    left[i] = static_cast<float>(matrix == Matrix::kWeighted ? std::sqrt(cosine) : 1 / cosine);
-    right[i] = static_cast<float>(matrix == Matrix::kWeighted ? std::sqrt(cosine) : 1);
+    left[i] = matrix == Matrix::kWeighted ? std::sqrt(cosine) : 1 / cosine;
+    right[i] = matrix == Matrix::kWeighted ? std::sqrt(cosine) : 1;
   }
-  const auto decompose = [&](const Block& block) {
-    return Eigen::BDCSVD<Eigen::MatrixXf>(
-        left.matrix().asDiagonal() * block * right.matrix().asDiagonal(),
-        Eigen::ComputeThinU | Eigen::ComputeThinV);
+  const auto scaled = [&](const Block& block) -> Eigen::MatrixXd {
+    return left.matrix().asDiagonal() * block.cast<double>() * right.matrix().asDiagonal();
   };
-  const auto svd_both = decompose(both);
-  const auto svd_tt = decompose(tt);
+  const Eigen::MatrixXd scaled_both = scaled(both);
+  const Eigen::MatrixXd scaled_tt = scaled(tt);
+  const RightSingular singular_both = right_singular(scaled_both);
+  const RightSingular singular_tt = right_singular(scaled_tt);
 
   // Singular values of the whole matrix: cos(m (phi_o - phi_i)) has the norm 2 pi for m = 0, pi
   // twice for the others.
@@ -110,11 +110,11 @@ void BcsdfFactors::cut(const Block& both, const Block& tt, const std::vector<dou
   std::vector<Term> candidates;
   double total = 0;
   for (int i = 0; i < thetas_; ++i) {
-    candidates.push_back({2 * kPi * svd_both.singularValues()[i], 0});
+    candidates.push_back({2 * kPi * singular_both.values[i], 0});
     total += candidates.back().value * candidates.back().value;
     for (std::size_t m = 1; m < mode_scales.size(); ++m) {
       candidates.push_back(
-          {kPi * std::abs(mode_scales[m]) * svd_tt.singularValues()[i], static_cast<int>(m)});
+          {kPi * std::abs(mode_scales[m]) * singular_tt.values[i], static_cast<int>(m)});
       total += 2 * candidates.back().value * candidates.back().value;
     }
   }
@@ -135,17 +135,18 @@ void BcsdfFactors::cut(const Block& both, const Block& tt, const std::vector<dou
   terms_[at] = spent;
   energy_[at] = total > 0 ? held / total : 1;
 
-  const auto rebuilt = [&](const Eigen::BDCSVD<Eigen::MatrixXf>& svd, int rank) -> Block {
-    return left.inverse().matrix().asDiagonal() *
-           (svd.matrixU().leftCols(rank) * svd.singularValues().head(rank).asDiagonal() *
-            svd.matrixV().leftCols(rank).transpose()) *
-           right.inverse().matrix().asDiagonal();
+  const auto rebuilt = [&](const Eigen::MatrixXd& whole, const RightSingular& singular,
+                           int rank) -> Block {
+    return (left.inverse().matrix().asDiagonal() * of_rank(whole, singular, rank) *
+            right.inverse().matrix().asDiagonal())
+        .cast<float>();
   };
   for (std::size_t m = 0; m < kept.size(); ++m) {
     if (kept[m] == 0) continue;
     colours_[at].modes.push_back({static_cast<int>(m), static_cast<int>(colours_[at].blocks.size()),
                                   m == 0 ? 1.0F : static_cast<float>(mode_scales[m])});
-    colours_[at].blocks.push_back(rebuilt(m == 0 ? svd_both : svd_tt, kept[m]));
+    colours_[at].blocks.push_back(m == 0 ? rebuilt(scaled_both, singular_both, kept[m])
+                                         : rebuilt(scaled_tt, singular_tt, kept[m]));
   }
 }
 

@@ -7,12 +7,12 @@
 #include <cassert>
 #include <cmath>
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/QR>
 
 #include "fibers/math/random.h"
 #include "fibers/math/signed_distance.h"
 #include "fibers/math/spherical_map.h"
+#include "fibers/math/symmetric_eigen.h"
 #include "formats/input_error.h"
 #include "formats/tensor_file.h"
 
@@ -43,9 +43,8 @@ Matrix principal_components(const Matrix& data, Eigen::Index count) {
             Eigen::MatrixXf::Identity(data.cols(), tried);
   }
   const Eigen::MatrixXd within = (data * space).cast<double>();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(within.transpose() * within);
-  return (space * solver.eigenvectors().rightCols(count).rowwise().reverse().cast<float>())
-      .transpose();
+  const SymmetricEigen eigen = symmetric_eigen(within.transpose() * within);
+  return (space * eigen.vectors.rightCols(count).rowwise().reverse().cast<float>()).transpose();
 }
 
 }  // namespace

@@ -28,6 +28,9 @@ constexpr double kNegligible = 1e-4;
 // Wider is constant over half a turn.
 constexpr double kWidest = 1e3;
 
+// Means keep this far from the poles of a thread's frame, which have no azimuth.
+constexpr double kEdge = 1e-3;
+
 struct Angles {
   double theta;
   double phi;
@@ -117,8 +120,8 @@ struct InteractiveMicrocylinder::Around {
 
   /// The mean, moved into the domain.
   Angles inside() const {
-    const double edge = kHalfPi - 1e-3;  // poles of the thread frame have no azimuth
-    return {std::clamp(theta.mean, -edge, edge), std::clamp(phi.mean, -kHalfPi, kHalfPi)};
+    const double most = kHalfPi - kEdge;
+    return {std::clamp(theta.mean, -most, most), std::clamp(phi.mean, -kHalfPi, kHalfPi)};
   }
   Vec3d direction(const Angles& at) const {
     return frame * Vec3d(std::sin(at.theta), std::cos(at.theta) * std::sin(at.phi),
@@ -315,11 +318,9 @@ Rgbd InteractiveMicrocylinder::shade_in_double(const Mat3d& frame, const Vec3d& 
   return radiance;
 }
 
-namespace {
-
-// Terms (lights times lobes) of one tangent that shade() computes eight at a time, one array for
-// each quantity.
-struct Terms {
+/// Terms (lights times lobes) of one tangent that shade() computes eight at a time, one array for
+/// each quantity.
+struct InteractiveMicrocylinder::Terms {
   static constexpr std::size_t kQuantities = 9;
   enum Quantity : std::size_t {
     kSinTheta,
@@ -342,13 +343,39 @@ struct Terms {
     light.resize(count + kFloat8Lanes);
   }
   Float8 get(Quantity quantity, std::size_t first) const { return load8(&values[quantity][first]); }
+  void put(Quantity quantity, Float8 value) { store8(value, &values[quantity][size]); }
+
+  /// Removes the terms of less weight; the last eight are filled up with copies.
+  void keep_from(float least) {
+    std::size_t kept = 0;
+    for (std::size_t k = 0; k < size; ++k) {
+      if (values[kWeight][k] < least) continue;
+      for (std::vector<float>& value : values) value[kept] = value[k];
+      light[kept++] = light[k];
+    }
+    size = kept;
+    if (kept == 0) return;
+    for (std::size_t k = kept; k % kFloat8Lanes != 0; ++k) {
+      for (std::vector<float>& value : values) value[k] = value[kept - 1];
+    }
+  }
 };
 
-// What shade() knows of the Gaussian lights, [light] padded to eights: axes in the patch frame,
-// sharpness / 2, colour over mass.
-struct LightLanes {
+/// What shade() knows of the Gaussian lights, [light] padded to eights: axes in the patch frame,
+/// sharpness / 2, colour over mass.
+struct InteractiveMicrocylinder::LightLanes {
   std::vector<float> x, y, z, half_sharpness, brightness;
   std::vector<Rgbd> colour;
+
+  LightLanes(const Mat3d& frame, std::span<const Light> lights) {
+    for (const Light& light : lights) {
+      if (light.is_directional()) continue;
+      const double sharpness = static_cast<double>(light.sharpness);
+      add(frame.transpose() * light.axis.cast<double>(), sharpness,
+          light.irradiance.cast<double>() / sg_mass(sharpness));
+    }
+    while (colour.size() % kFloat8Lanes != 0) add(Vec3d(0, 0, -1), 1e4, Rgbd::Zero());
+  }
 
   void add(const Vec3d& axis, double sharpness, const Rgbd& radiance) {
     x.push_back(static_cast<float>(axis.x()));
@@ -359,15 +386,12 @@ struct LightLanes {
     brightness.push_back(static_cast<float>(radiance.maxCoeff()));
     colour.push_back(radiance);
   }
-  void pad() {
-    while (colour.size() % kFloat8Lanes != 0) add(Vec3d(0, 0, -1), 1e4, Rgbd::Zero());
-  }
 };
+
+namespace {
 
 // The part of all estimates that shade() leaves out at most.
 constexpr float kLeftOut = 1e-3F;
-
-constexpr float kEdge8 = 1e-3F;  // poles of a thread frame have no azimuth
 
 Float8 reflectance8(float ior, Float8 cosine) {
   const Float8 refracted = sqrt8(ior * ior - 1 + cosine * cosine);
@@ -376,7 +400,7 @@ Float8 reflectance8(float ior, Float8 cosine) {
   return 0.5F * (s * s + p * p);
 }
 
-// average_over() for eight at a time: cosines of x / 2 - `half_shift`, and of x, at the nodes.
+// average_over() for eight at a time.
 struct Average8 {
   std::array<Float8, kSide> at;
   std::array<Float8, kSide> weight;
@@ -407,7 +431,192 @@ Average8 average8(Float8 mean, Float8 width) {
   return result;
 }
 
+// One tangent and the viewer.
+struct View8 {
+  Mat3 to_patch;  // patch = to_patch * thread
+  float ior;
+  float theta_o;
+  float phi_o;
+  float cos_o;
+  bool half_angle;  // Fresnel's terms at the half angle, otherwise at each direction's own
+  float leaving;    // then: the share that passes the surface towards the viewer
+
+  View8(const Mat3d& frame, double index, ThreadConventions::Fresnel fresnel, const Vec3d& out)
+      : to_patch(frame.cast<float>()),
+        ior(static_cast<float>(index)),
+        half_angle(fresnel == ThreadConventions::Fresnel::kHalf) {
+    const Vec3d o = frame.transpose() * out;
+    theta_o = static_cast<float>(std::asin(std::clamp(o.x(), -1.0, 1.0)));
+    phi_o = static_cast<float>(std::atan2(o.y(), o.z()));
+    cos_o = std::cos(theta_o);
+    leaving =
+        half_angle ? 0 : 1 - static_cast<float>(fresnel_reflectance<1>(index, Lanes<1>(o.z()))[0]);
+  }
+
+  Vec8 patch(Float8 x, Float8 y, Float8 z) const {
+    return {to_patch(0, 0) * x + to_patch(0, 1) * y + to_patch(0, 2) * z,
+            to_patch(1, 0) * x + to_patch(1, 1) * y + to_patch(1, 2) * z,
+            to_patch(2, 0) * x + to_patch(2, 1) * y + to_patch(2, 2) * z};
+  }
+
+  // Smooth factors averaged over the nodes of both Gaussians; surface: by lane, or volume.
+  Float8 smooth(const CircularGaussian8& theta, const CircularGaussian8& phi, Int8 surface) const {
+    const Average8 theta_nodes = average8(theta.mean, theta.width);
+    const Average8 phi_nodes = average8(phi.mean, phi.width);
+    std::array<Float8, kSide> cos_half_phi_d;
+    std::array<Float8, kSide> cosine_phi = {};
+    for (std::size_t k = 0; k < kSide; ++k) {
+      cos_half_phi_d[k] = cosine8(0.5F * (phi_nodes.at[k] - phi_o));
+      if (!half_angle) cosine_phi[k] = cosine8(phi_nodes.at[k]);
+    }
+    Float8 result = {};
+    for (std::size_t a = 0; a < kSide; ++a) {
+      const Float8 cosine = cosine8(theta_nodes.at[a]);
+      const Float8 cos_theta_d = cosine8(0.5F * (theta_nodes.at[a] - theta_o));
+      Float8 along =
+          theta_nodes.weight[a] * cosine * cosine / max8(cos_theta_d * cos_theta_d, splat8(1e-12F));
+      along = surface ? along : along / (cosine + cos_o);
+      Float8 sum = {};
+      for (std::size_t k = 0; k < kSide; ++k) {
+        const Float8 reflected = reflectance8(ior, max8(cos_theta_d * cos_half_phi_d[k], Float8{}));
+        const Float8 entering =
+            half_angle ? (1 - reflected) * (1 - reflected)
+                       : leaving * (1 - reflectance8(ior, max8(cosine * cosine_phi[k], Float8{})));
+        sum += phi_nodes.weight[k] * (surface ? reflected * cos_half_phi_d[k] : entering);
+      }
+      result += along * sum;
+    }
+    return result;
+  }
+};
+
+SignedDistance8 distance_at(const PointVisibility& visibility, const Vec8& direction) {
+  if (visibility.maps != nullptr)
+    return visibility.maps->evaluate(visibility.coefficients, direction);
+  // Nothing but the surface itself hides.
+  const Float8 across = sqrt8(direction.x * direction.x + direction.y * direction.y);
+  const Float8 scale = across > 1e-6F ? 1 / across : Float8{};
+  return {atan2_8(direction.z, across),
+          {-direction.z * direction.x * scale, -direction.z * direction.y * scale,
+           across * across * scale}};
+}
+
 }  // namespace
+
+void InteractiveMicrocylinder::find_terms(std::size_t t, const Vec3d& out, const LightLanes& lights,
+                                          Terms& own, float& total) const {
+  own.size = 0;
+  const Tangent& tangent = tangents_[t];
+  const Vec3d o = tangent.frame.transpose() * out;
+  if (o.z() <= 0) return;
+  const std::size_t padded = lights.colour.size();
+  own.reserve(3 * padded);
+  const auto sin_o = static_cast<float>(o.x());
+  const auto cos_o = static_cast<float>(std::sqrt(std::max(0.0, 1 - o.x() * o.x())));
+  const Mat3 to_thread = tangent.frame.transpose().cast<float>();
+  const auto albedo = static_cast<float>(tangent.scattering.parameters().albedo.maxCoeff());
+  const auto share = static_cast<float>(
+      fabric_.threads[static_cast<std::size_t>(tangent.thread)].share * samples_[t].share);
+  for (std::size_t first = 0; first < padded; first += kFloat8Lanes) {
+    const Vec8 axis = {load8(&lights.x[first]), load8(&lights.y[first]), load8(&lights.z[first])};
+    const Float8 w_k = load8(&lights.half_sharpness[first]);
+    const auto component = [&](int row) {
+      return to_thread(row, 0) * axis.x + to_thread(row, 1) * axis.y + to_thread(row, 2) * axis.z;
+    };
+    const Float8 sin_k = max8(min8(component(0), splat8(1)), splat8(-1));
+    const Float8 across = component(1);
+    const Float8 normal = component(2);
+    const Float8 cos_k = max8(sqrt8(across * across + normal * normal), splat8(1e-9F));
+    // No more of the light than this reaches what lies above the surface, and above the thread's
+    // own horizon.
+    const Float8 above = sqrt8(max8(1 - axis.z * axis.z, Float8{}));
+    const Float8 beside = sqrt8(sin_k * sin_k + across * across);
+    const Float8 hidden =
+        2 * w_k * (min8(axis.z < 0 ? above - 1 : Float8{}, normal < 0 ? beside - 1 : Float8{}));
+    const Float8 light_estimate = load8(&lights.brightness[first]) * share * exp8(hidden);
+    for (const Lobe& lobe : tangent.lobes) {
+      if (lobe.amplitude == 0) continue;
+      const auto w_l = static_cast<float>(1 / (lobe.width * lobe.width));
+      const Float8 real = w_k * cos_k + w_l * cos_o;
+      const Float8 imaginary = w_k * sin_k - w_l * sin_o;
+      const Float8 length = sqrt8(real * real + imaginary * imaginary);
+      const Float8 apart = (cos_k - cos_o) * (cos_k - cos_o) + (sin_k + sin_o) * (sin_k + sin_o);
+      const Float8 amplitude =
+          static_cast<float>(lobe.amplitude) * exp8(-2 * w_k * w_l * apart / (length + w_k + w_l));
+      const Float8 cos_l = max8(real / length, splat8(1e-9F));
+      const Float8 sin_l = imaginary / length;
+      constexpr auto kWidest8 = static_cast<float>(kWidest);
+      const Float8 theta_width = min8(1 / sqrt8(length), splat8(kWidest8));
+      const Float8 phi_width = min8(1 / sqrt8(w_k * cos_l * cos_k), splat8(kWidest8));
+      constexpr float kRootPi = 1.77245385F;
+      const Float8 mass =
+          min8(kRootPi * theta_width, splat8(kPif)) * min8(kRootPi * phi_width, splat8(kPif));
+      // cos^2 theta_i / cos^2 theta_d at the mean; cos^2 of a half is (1 + cos) / 2.
+      const Float8 cos_squared_d = max8(0.5F * (1 + cos_l * cos_o + sin_l * sin_o), splat8(1e-3F));
+      Float8 estimate = light_estimate * amplitude * mass * cos_l * cos_l / cos_squared_d;
+      if (!lobe.surface) estimate *= albedo / (cos_l + cos_o);
+      own.put(Terms::kSinTheta, sin_l);
+      own.put(Terms::kCosTheta, cos_l);
+      own.put(Terms::kThetaWidth, theta_width);
+      own.put(Terms::kSinPhi, across / cos_k);
+      own.put(Terms::kCosPhi, normal / cos_k);
+      own.put(Terms::kPhiWidth, phi_width);
+      own.put(Terms::kFactor, amplitude);
+      own.put(Terms::kWeight, estimate);
+      own.put(Terms::kKind, splat8(lobe.surface ? 1.0F : 0.0F));
+      for (std::size_t k = 0; k < kFloat8Lanes; ++k) {
+        own.light[own.size + k] = static_cast<std::uint32_t>(first + k);
+        total += estimate[k];
+      }
+      own.size += kFloat8Lanes;
+    }
+  }
+}
+
+void InteractiveMicrocylinder::add_terms(std::size_t t, const Vec3d& out,
+                                         const WeightingTable::Outgoing& outgoing,
+                                         const LightLanes& lights,
+                                         const PointVisibility& visibility, const Terms& own,
+                                         Rgbd& radiance) const {
+  const Tangent& tangent = tangents_[t];
+  const ThreadParameters& parameters = tangent.scattering.parameters();
+  const View8 view(tangent.frame, parameters.ior, fabric_.conventions.fresnel, out);
+  for (std::size_t first = 0; first < own.size; first += kFloat8Lanes) {
+    const Float8 sin_l = own.get(Terms::kSinTheta, first);
+    const Float8 cos_l = own.get(Terms::kCosTheta, first);
+    const CircularGaussian8 theta = {atan2_8(sin_l, cos_l), own.get(Terms::kThetaWidth, first)};
+    const Float8 sin_k = own.get(Terms::kSinPhi, first);
+    const Float8 cos_k = own.get(Terms::kCosPhi, first);
+    const CircularGaussian8 phi = {atan2_8(sin_k, cos_k), own.get(Terms::kPhiWidth, first)};
+
+    // The mean, moved into the domain, and the line through the nearest border.
+    const Float8 cos_theta = max8(cos_l, splat8(static_cast<float>(kEdge)));
+    const Float8 sin_theta = sign8(sin_l) * sqrt8(1 - cos_theta * cos_theta);
+    const Float8 cos_phi = max8(cos_k, Float8{});
+    const Float8 sin_phi = cos_k > 0 ? sin_k : sign8(sin_k);
+    const Vec8 direction = view.patch(sin_theta, cos_theta * sin_phi, cos_theta * cos_phi);
+    VisibilityLine8 line =
+        visibility_line(distance_at(visibility, direction), cos_theta,
+                        view.patch(cos_theta, -sin_theta * sin_phi, -sin_theta * cos_phi),
+                        view.patch(Float8{}, cos_phi, -sin_phi));
+    line.distance += line.theta_gradient * (theta.mean - atan2_8(sin_theta, cos_theta)) +
+                     line.phi_gradient * (phi.mean - atan2_8(sin_phi, cos_phi));
+    const Float8 integral = clipped_gaussians(theta, phi, line);
+    if (!any8(integral > 0)) continue;
+
+    const Float8 across_width = phi.width * cos_theta;
+    const Float8 sharpness = 4 / (theta.width * theta.width + across_width * across_width);
+    const Float8 weight = table_.value(t, outgoing, direction, sharpness);
+    const Int8 surface = own.get(Terms::kKind, first) > 0.5F;
+    const Float8 value =
+        weight * view.smooth(theta, phi, surface) * own.get(Terms::kFactor, first) * integral;
+    const std::size_t lanes = std::min<std::size_t>(kFloat8Lanes, own.size - first);
+    for (std::size_t k = 0; k < lanes; ++k) {
+      const Rgbd colour = static_cast<double>(value[k]) * lights.colour[own.light[first + k]];
+      radiance += surface[k] != 0 ? colour : Rgbd(colour * parameters.albedo);
+    }
+  }
+}
 
 Rgbd InteractiveMicrocylinder::shade(const Mat3d& frame, const Vec3d& wo,
                                      std::span<const Light> lights,
@@ -416,205 +625,25 @@ Rgbd InteractiveMicrocylinder::shade(const Mat3d& frame, const Vec3d& wo,
   const Vec3d out = frame.transpose() * wo;
   if (out.z() <= 0) return Rgbd::Zero();
   Rgbd radiance = directional_light(frame, out, lights, visibility);
-
-  LightLanes gaussians;
-  for (const Light& light : lights) {
-    if (light.is_directional()) continue;
-    const double sharpness = static_cast<double>(light.sharpness);
-    gaussians.add(frame.transpose() * light.axis.cast<double>(), sharpness,
-                  light.irradiance.cast<double>() / sg_mass(sharpness));
-  }
+  const LightLanes gaussians(frame, lights);
   if (gaussians.colour.empty()) return radiance;
-  gaussians.pad();
-  const WeightingTable::Outgoing outgoing = table_.outgoing(out);
 
   // First all products of lights and lobes, with an estimate of what each contributes.
   thread_local std::vector<Terms> terms;
   terms.resize(tangents_.size());
-  const std::size_t padded = gaussians.colour.size();
   float total = 0;
-  for (std::size_t t = 0; t < tangents_.size(); ++t) {
-    const Tangent& tangent = tangents_[t];
-    Terms& own = terms[t];
-    own.size = 0;
-    const Vec3d o = tangent.frame.transpose() * out;
-    if (o.z() <= 0) continue;
-    own.reserve(3 * padded);
-    const auto sin_o = static_cast<float>(o.x());
-    const auto cos_o = static_cast<float>(std::sqrt(std::max(0.0, 1 - o.x() * o.x())));
-    const Mat3 to_thread = tangent.frame.transpose().cast<float>();
-    const auto albedo = static_cast<float>(tangent.scattering.parameters().albedo.maxCoeff());
-    const auto share = static_cast<float>(
-        fabric_.threads[static_cast<std::size_t>(tangent.thread)].share * samples_[t].share);
-    for (std::size_t first = 0; first < padded; first += kFloat8Lanes) {
-      const Vec8 axis = {load8(&gaussians.x[first]), load8(&gaussians.y[first]),
-                         load8(&gaussians.z[first])};
-      const Float8 w_k = load8(&gaussians.half_sharpness[first]);
-      const auto component = [&](int row) {
-        return to_thread(row, 0) * axis.x + to_thread(row, 1) * axis.y + to_thread(row, 2) * axis.z;
-      };
-      const Float8 sin_k = max8(min8(component(0), splat8(1)), splat8(-1));
-      const Float8 across = component(1);
-      const Float8 normal = component(2);
-      const Float8 cos_k = max8(sqrt8(across * across + normal * normal), splat8(1e-9F));
-      // No more of the light than this reaches what lies above the surface, and above the thread's
-      // own horizon.
-      const Float8 above = sqrt8(max8(1 - axis.z * axis.z, Float8{}));
-      const Float8 beside = sqrt8(sin_k * sin_k + across * across);
-      const Float8 hidden =
-          2 * w_k * (min8(axis.z < 0 ? above - 1 : Float8{}, normal < 0 ? beside - 1 : Float8{}));
-      const Float8 light_estimate = load8(&gaussians.brightness[first]) * share * exp8(hidden);
-      for (const Lobe& lobe : tangent.lobes) {
-        if (lobe.amplitude == 0) continue;
-        const auto w_l = static_cast<float>(1 / (lobe.width * lobe.width));
-        const Float8 real = w_k * cos_k + w_l * cos_o;
-        const Float8 imaginary = w_k * sin_k - w_l * sin_o;
-        const Float8 length = sqrt8(real * real + imaginary * imaginary);
-        const Float8 apart = (cos_k - cos_o) * (cos_k - cos_o) + (sin_k + sin_o) * (sin_k + sin_o);
-        const Float8 amplitude = static_cast<float>(lobe.amplitude) *
-                                 exp8(-2 * w_k * w_l * apart / (length + w_k + w_l));
-        const Float8 cos_l = max8(real / length, splat8(1e-9F));
-        const Float8 sin_l = imaginary / length;
-        constexpr auto kWidest8 = static_cast<float>(kWidest);
-        const Float8 theta_width = min8(1 / sqrt8(length), splat8(kWidest8));
-        const Float8 phi_width = min8(1 / sqrt8(w_k * cos_l * cos_k), splat8(kWidest8));
-        constexpr float kRootPi = 1.77245385F;
-        const Float8 mass =
-            min8(kRootPi * theta_width, splat8(kPif)) * min8(kRootPi * phi_width, splat8(kPif));
-        // cos^2 theta_i / cos^2 theta_d at the mean; cos^2 of a half is (1 + cos) / 2.
-        const Float8 cos_squared_d =
-            max8(0.5F * (1 + cos_l * cos_o + sin_l * sin_o), splat8(1e-3F));
-        Float8 estimate = light_estimate * amplitude * mass * cos_l * cos_l / cos_squared_d;
-        if (!lobe.surface) estimate *= albedo / (cos_l + cos_o);
-        const auto put = [&](Terms::Quantity quantity, Float8 value) {
-          store8(value, &own.values[quantity][own.size]);
-        };
-        put(Terms::kSinTheta, sin_l);
-        put(Terms::kCosTheta, cos_l);
-        put(Terms::kThetaWidth, theta_width);
-        put(Terms::kSinPhi, across / cos_k);
-        put(Terms::kCosPhi, normal / cos_k);
-        put(Terms::kPhiWidth, phi_width);
-        put(Terms::kFactor, amplitude);
-        put(Terms::kWeight, estimate);
-        put(Terms::kKind, splat8(lobe.surface ? 1.0F : 0.0F));
-        for (std::size_t k = 0; k < kFloat8Lanes; ++k) {
-          own.light[own.size + k] = static_cast<std::uint32_t>(first + k);
-          total += estimate[k];
-        }
-        own.size += kFloat8Lanes;
-      }
-    }
-  }
   std::size_t count = 0;
-  for (const Terms& own : terms) count += own.size;
-  if (count == 0 || !(total > 0)) return radiance;
-  const float least = kLeftOut * total / static_cast<float>(count);
-
   for (std::size_t t = 0; t < tangents_.size(); ++t) {
-    Terms& own = terms[t];
-    std::size_t kept = 0;
-    for (std::size_t k = 0; k < own.size; ++k) {
-      if (own.values[Terms::kWeight][k] < least) continue;
-      for (std::vector<float>& value : own.values) value[kept] = value[k];
-      own.light[kept++] = own.light[k];
-    }
-    if (kept == 0) continue;
-    // the last eight are filled with copies
-    for (std::size_t k = kept; k % kFloat8Lanes != 0; ++k) {
-      for (std::vector<float>& value : own.values) value[k] = value[kept - 1];
-    }
+    find_terms(t, out, gaussians, terms[t], total);
+    count += terms[t].size;
+  }
+  if (count == 0 || !(total > 0)) return radiance;
 
-    const Tangent& tangent = tangents_[t];
-    const ThreadParameters& parameters = tangent.scattering.parameters();
-    const auto ior = static_cast<float>(parameters.ior);
-    const Vec3d o = tangent.frame.transpose() * out;
-    const auto theta_o = static_cast<float>(std::asin(std::clamp(o.x(), -1.0, 1.0)));
-    const auto phi_o = static_cast<float>(std::atan2(o.y(), o.z()));
-    const float cos_o = std::cos(theta_o);
-    const bool half_angle = fabric_.conventions.fresnel == ThreadConventions::Fresnel::kHalf;
-    const float leaving =
-        half_angle
-            ? 0
-            : 1 - static_cast<float>(fresnel_reflectance<1>(parameters.ior, Lanes<1>(o.z()))[0]);
-    const Mat3 to_patch = tangent.frame.cast<float>();
-    const auto patch = [&](Float8 x, Float8 y, Float8 z) {
-      return Vec8{to_patch(0, 0) * x + to_patch(0, 1) * y + to_patch(0, 2) * z,
-                  to_patch(1, 0) * x + to_patch(1, 1) * y + to_patch(1, 2) * z,
-                  to_patch(2, 0) * x + to_patch(2, 1) * y + to_patch(2, 2) * z};
-    };
-
-    for (std::size_t first = 0; first < kept; first += kFloat8Lanes) {
-      const Float8 sin_l = own.get(Terms::kSinTheta, first);
-      const Float8 cos_l = own.get(Terms::kCosTheta, first);
-      const CircularGaussian8 theta = {atan2_8(sin_l, cos_l), own.get(Terms::kThetaWidth, first)};
-      const Float8 sin_k = own.get(Terms::kSinPhi, first);
-      const Float8 cos_k = own.get(Terms::kCosPhi, first);
-      const CircularGaussian8 phi = {atan2_8(sin_k, cos_k), own.get(Terms::kPhiWidth, first)};
-
-      // The mean, moved into the domain, and the line through the nearest border.
-      const Float8 cos_theta = max8(cos_l, splat8(kEdge8));
-      const Float8 sin_theta = sign8(sin_l) * sqrt8(1 - cos_theta * cos_theta);
-      const Float8 cos_phi = max8(cos_k, Float8{});
-      const Float8 sin_phi = cos_k > 0 ? sin_k : sign8(sin_k);
-      const Vec8 direction = patch(sin_theta, cos_theta * sin_phi, cos_theta * cos_phi);
-      SignedDistance8 distance;
-      if (visibility.maps != nullptr) {
-        distance = visibility.maps->evaluate(visibility.coefficients, direction);
-      } else {
-        const Float8 across = sqrt8(direction.x * direction.x + direction.y * direction.y);
-        const Float8 scale = across > 1e-6F ? 1 / across : Float8{};
-        distance = {atan2_8(direction.z, across),
-                    {-direction.z * direction.x * scale, -direction.z * direction.y * scale,
-                     across * across * scale}};
-      }
-      VisibilityLine8 line = visibility_line(
-          distance, cos_theta, patch(cos_theta, -sin_theta * sin_phi, -sin_theta * cos_phi),
-          patch(Float8{}, cos_phi, -sin_phi));
-      line.distance += line.theta_gradient * (theta.mean - atan2_8(sin_theta, cos_theta)) +
-                       line.phi_gradient * (phi.mean - atan2_8(sin_phi, cos_phi));
-      const Float8 integral = clipped_gaussians(theta, phi, line);
-      if (!any8(integral > 0)) continue;
-
-      const Float8 across_width = phi.width * cos_theta;
-      const Float8 sharpness = 4 / (theta.width * theta.width + across_width * across_width);
-      const Float8 weight = table_.value(t, outgoing, direction, sharpness);
-
-      const Int8 surface = own.get(Terms::kKind, first) > 0.5F;
-      const Average8 theta_nodes = average8(theta.mean, theta.width);
-      const Average8 phi_nodes = average8(phi.mean, phi.width);
-      std::array<Float8, kSide> cos_half_phi_d;
-      std::array<Float8, kSide> cosine_phi = {};
-      for (std::size_t k = 0; k < kSide; ++k) {
-        cos_half_phi_d[k] = cosine8(0.5F * (phi_nodes.at[k] - phi_o));
-        if (!half_angle) cosine_phi[k] = cosine8(phi_nodes.at[k]);
-      }
-      Float8 smooth = {};
-      for (std::size_t a = 0; a < kSide; ++a) {
-        const Float8 cosine = cosine8(theta_nodes.at[a]);
-        const Float8 cos_theta_d = cosine8(0.5F * (theta_nodes.at[a] - theta_o));
-        Float8 along = theta_nodes.weight[a] * cosine * cosine /
-                       max8(cos_theta_d * cos_theta_d, splat8(1e-12F));
-        along = surface ? along : along / (cosine + cos_o);
-        Float8 sum = {};
-        for (std::size_t k = 0; k < kSide; ++k) {
-          const Float8 reflected =
-              reflectance8(ior, max8(cos_theta_d * cos_half_phi_d[k], Float8{}));
-          const Float8 entering =
-              half_angle
-                  ? (1 - reflected) * (1 - reflected)
-                  : leaving * (1 - reflectance8(ior, max8(cosine * cosine_phi[k], Float8{})));
-          sum += phi_nodes.weight[k] * (surface ? reflected * cos_half_phi_d[k] : entering);
-        }
-        smooth += along * sum;
-      }
-      const Float8 value = weight * smooth * own.get(Terms::kFactor, first) * integral;
-      const std::size_t lanes = std::min<std::size_t>(kFloat8Lanes, kept - first);
-      for (std::size_t k = 0; k < lanes; ++k) {
-        const Rgbd colour = static_cast<double>(value[k]) * gaussians.colour[own.light[first + k]];
-        radiance += surface[k] != 0 ? colour : Rgbd(colour * parameters.albedo);
-      }
-    }
+  const float least = kLeftOut * total / static_cast<float>(count);
+  const WeightingTable::Outgoing outgoing = table_.outgoing(out);
+  for (std::size_t t = 0; t < tangents_.size(); ++t) {
+    terms[t].keep_from(least);
+    if (terms[t].size > 0) add_terms(t, out, outgoing, gaussians, visibility, terms[t], radiance);
   }
   return radiance;
 }
@@ -641,11 +670,7 @@ Rgbd ray_traced_radiance(const std::function<Rgbd(const Vec3d& wi, const Vec3d& 
     const double sharpness = static_cast<double>(light.sharpness);
     Rgbd sum = Rgbd::Zero();
     for (int i = 0; i < strata; ++i) {
-      // The distance within which the share (i + 1/2) / strata of the light lies.
-      const double share = (i + 0.5) / strata;
-      const double depth = sharpness < 1e-6
-                               ? 2 * share
-                               : -std::log1p(share * std::expm1(-2 * sharpness)) / sharpness;
+      const double depth = sg_depth_of_share((i + 0.5) / strata, sharpness);
       const double cosine = 1 - depth;
       const double sine = std::sqrt(std::max(0.0, depth * (2 - depth)));
       for (int j = 0; j < strata; ++j) {

@@ -75,12 +75,22 @@ class InteractiveMicrocylinder {
   struct Tangent;
   struct Lobe;
   struct Around;
+  struct Terms;
+  struct LightLanes;
 
   void prepare();
   static std::array<Lobe, 3> lobes_of(const ThreadScattering& scattering);
   double clipped(const Around& around, const PointVisibility& visibility) const;
   Rgbd directional_light(const Mat3d& frame, const Vec3d& out, std::span<const Light> lights,
                          const PointVisibility& visibility) const;
+  /// shade(): the products of all Gaussian lights with the lobes of tangent t, and an estimate of
+  /// what each sends to `out` (patch frame), which is added to `total`.
+  void find_terms(std::size_t t, const Vec3d& out, const LightLanes& lights, Terms& own,
+                  float& total) const;
+  /// shade(): adds what the terms of tangent t send to `out`.
+  void add_terms(std::size_t t, const Vec3d& out, const WeightingTable::Outgoing& outgoing,
+                 const LightLanes& lights, const PointVisibility& visibility, const Terms& own,
+                 Rgbd& radiance) const;
 
   MicrocylinderFabric fabric_;
   InteractiveSettings settings_;

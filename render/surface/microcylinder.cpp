@@ -9,6 +9,7 @@
 
 #include "fibers/math/adaptive_cubature.h"
 #include "fibers/math/quadrature.h"
+#include "fibers/math/spherical_gaussian.h"
 
 namespace heddle {
 namespace {
@@ -389,14 +390,10 @@ Rgbd Microcylinder::reflected_sg(const SurfacePoint& point, const Vec3d& axis, d
   const double elevation = std::atan2(axis.z(), sine);
   const Vec3d up = sine > 1e-12 ? Vec3d((Vec3d(0, 0, 1) - axis.z() * axis) / sine) : Vec3d(1, 0, 0);
   const Vec3d side = axis.cross(up);
-  const double whole = -std::expm1(-2 * sharpness);
-  // 1 - cos of the distance within which the share s^2 of the light lies, and back.
-  const auto depth_of = [&](double s) {
-    return sharpness < 1e-9 ? 2 * s * s : std::min(2.0, -std::log1p(-s * s * whole) / sharpness);
-  };
-  const auto share_of = [&](double distance) {
+  // s at a distance from the axis, radians.
+  const auto place_of = [&](double distance) {
     const double depth = 2 * std::pow(std::sin(0.5 * std::clamp(distance, 0.0, kPi)), 2);
-    return std::sqrt(sharpness < 1e-9 ? 0.5 * depth : -std::expm1(-sharpness * depth) / whole);
+    return std::sqrt(sg_share_within(depth, sharpness));
   };
   CubatureSettings settings;
   settings.tolerance = 2e-3;
@@ -405,10 +402,10 @@ Rgbd Microcylinder::reflected_sg(const SurfacePoint& point, const Vec3d& axis, d
   settings.columns = std::clamp(static_cast<int>(std::ceil(reach / radians(20))), 2, 8);
   settings.rows = 2 * settings.columns;
   const auto integrate_between = [&](double from, double to) {
-    if (!(share_of(to) > share_of(from))) return Rgbd(Rgbd::Zero());
+    if (!(place_of(to) > place_of(from))) return Rgbd(Rgbd::Zero());
     return integrate_rectangle(
-        share_of(from), share_of(to), -1, 1, settings, [&](double s, double v) -> Rgbd {
-          const double depth = depth_of(s);
+        place_of(from), place_of(to), -1, 1, settings, [&](double s, double v) -> Rgbd {
+          const double depth = sg_depth_of_share(s * s, sharpness);
           const double cosine = 1 - depth;
           const double radius = std::sqrt(depth * (2 - depth));
           // Half of the arc above the horizon.

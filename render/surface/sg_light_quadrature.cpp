@@ -1,8 +1,9 @@
 #include "render/surface/sg_light_quadrature.h"
 
-#include <algorithm>
 #include <cmath>
 #include <cstdint>
+
+#include "fibers/math/spherical_gaussian.h"
 
 namespace heddle {
 
@@ -11,16 +12,11 @@ Rgbd integrate_sg_light(const Vec3d& axis, double sharpness,
                         const SgLightQuadrature& settings) {
   const Vec3d side = axis.unitOrthogonal();
   const Vec3d other = axis.cross(side);
-  const double tail = -std::expm1(-2.0 * sharpness);
-  // 1 - cosine of the angle within which the light has that share of its power.
-  const auto depth = [&](double share) {
-    return sharpness < 1e-6 ? 2.0 * share : std::min(2.0, -std::log1p(-share * tail) / sharpness);
-  };
   // Points (i + 1/2, i * generator) / count, with two successive Fibonacci numbers.
   const auto mean_over_lattice = [&](int count, int generator) {
     Rgbd sum = Rgbd::Zero();
     for (int i = 0; i < count; ++i) {
-      const double d = depth((i + 0.5) / count);
+      const double d = sg_depth_of_share((i + 0.5) / count, sharpness);
       const auto step = static_cast<std::int64_t>(i) * generator % count;
       const double azimuth = 2.0 * kPi * static_cast<double>(step) / count;
       const double sine = std::sqrt(d * (2.0 - d));

@@ -6,8 +6,7 @@
 #include <cassert>
 #include <cmath>
 
-#include <Eigen/Eigenvalues>
-
+#include "fibers/math/symmetric_eigen.h"
 #include "formats/input_error.h"
 #include "formats/tensor_file.h"
 #include "render/surface/tangent_curve.h"
@@ -142,50 +141,50 @@ std::vector<double> thread_weights(const MicrocylinderFabric& fabric,
   return weights;
 }
 
-WeightingTable::WeightingTable(const MicrocylinderFabric& fabric,
-                               std::span<const TangentSample> tangents, Weighting weighting,
-                               const WeightingTableSettings& settings)
-    : columns_(settings.columns), wo_rows_(settings.rows), axis_rows_(2 * settings.rows) {
-  assert(settings.columns >= 4 && settings.rows >= 2 && !tangents.empty());
-  // Directions of light that are averaged, and those of the table, which are the limit of great
-  // sharpness.
-  struct Incoming {
-    Vec3d direction;
-    double solid_angle;
-  };
-  std::vector<Incoming> incoming;
-  const int fine_rows = 2 * settings.rows;
-  const int fine_columns = 2 * settings.columns;
-  for (int row = 0; row < fine_rows; ++row) {
-    const double polar = 0.5 * kPi * (row + 0.5) / fine_rows;
-    for (int column = 0; column < fine_columns; ++column) {
-      incoming.push_back(
-          {spherical(polar, 2 * kPi * (column + 0.5) / fine_columns), std::sin(polar)});
-    }
-  }
-  std::vector<Vec3d> axes;
-  for (int row = 0; row < axis_rows_; ++row) {
-    for (int column = 0; column < columns_; ++column) {
-      axes.push_back(spherical(kPi * row / (axis_rows_ - 1), 2 * kPi * column / columns_));
-    }
-  }
-  std::vector<Vec3d> outgoing;
-  for (int row = 0; row < wo_rows_; ++row) {
-    for (int column = 0; column < columns_; ++column) {
-      outgoing.push_back(spherical(kLastPolar * row / (wo_rows_ - 1), 2 * kPi * column / columns_));
-    }
-  }
+namespace {
 
-  // W of all tangents, [tangent](incoming then axes, outgoing). Axes below the horizon stand for
-  // directions on it.
-  const auto fine = static_cast<Eigen::Index>(incoming.size());
-  const auto coarse = static_cast<Eigen::Index>(axes.size());
+using RowMajor = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+// A direction of light that is averaged over.
+struct Incoming {
+  Vec3d direction;
+  double solid_angle;
+};
+
+// The middles of a grid of the upper hemisphere.
+std::vector<Incoming> hemisphere_cells(int rows, int columns) {
+  std::vector<Incoming> cells;
+  for (int row = 0; row < rows; ++row) {
+    const double polar = 0.5 * kPi * (row + 0.5) / rows;
+    for (int column = 0; column < columns; ++column) {
+      cells.push_back({spherical(polar, 2 * kPi * (column + 0.5) / columns), std::sin(polar)});
+    }
+  }
+  return cells;
+}
+
+// The nodes that grid_position() lies between.
+std::vector<Vec3d> grid_nodes(int rows, int columns, double last) {
+  std::vector<Vec3d> nodes;
+  for (int row = 0; row < rows; ++row) {
+    for (int column = 0; column < columns; ++column)
+      nodes.push_back(spherical(last * row / (rows - 1), 2 * kPi * column / columns));
+  }
+  return nodes;
+}
+
+// W of all tangents, [tangent](light, outgoing). Lights below the horizon stand for directions on
+// it.
+std::vector<Eigen::MatrixXf> weights_of(const MicrocylinderFabric& fabric,
+                                        std::span<const TangentSample> tangents,
+                                        Weighting weighting, const std::vector<Vec3d>& lights,
+                                        const std::vector<Vec3d>& outgoing) {
+  const auto rows = static_cast<Eigen::Index>(lights.size());
   const auto seen = static_cast<Eigen::Index>(outgoing.size());
-  std::vector<Eigen::MatrixXf> weights(tangents.size(), Eigen::MatrixXf(fine + coarse, seen));
+  std::vector<Eigen::MatrixXf> weights(tangents.size(), Eigen::MatrixXf(rows, seen));
   tbb::parallel_for(Eigen::Index{0}, seen, [&](Eigen::Index o) {
-    for (Eigen::Index i = 0; i < fine + coarse; ++i) {
-      Vec3d wi = i < fine ? incoming[static_cast<std::size_t>(i)].direction
-                          : axes[static_cast<std::size_t>(i - fine)];
+    for (Eigen::Index i = 0; i < rows; ++i) {
+      Vec3d wi = lights[static_cast<std::size_t>(i)];
       const double horizon = std::cos(kLastPolar);
       if (wi.z() < horizon) {
         const double across = std::hypot(wi.x(), wi.y());
@@ -197,28 +196,79 @@ WeightingTable::WeightingTable(const MicrocylinderFabric& fabric,
       for (std::size_t t = 0; t < w.size(); ++t) weights[t](i, o) = static_cast<float>(w[t]);
     }
   });
+  return weights;
+}
 
-  // Averages over Gaussians as matrices, (axis, incoming), one per finite sharpness.
-  std::vector<Eigen::MatrixXf> averages(kLevels - 1, Eigen::MatrixXf(coarse, fine));
+// Means over the upper hemisphere's part of a Gaussian as a matrix, (axis, incoming).
+Eigen::MatrixXf gaussian_average(const std::vector<Vec3d>& axes,
+                                 const std::vector<Incoming>& incoming, double sharpness) {
+  const auto fine = static_cast<Eigen::Index>(incoming.size());
+  Eigen::MatrixXf average(static_cast<Eigen::Index>(axes.size()), fine);
+  for (Eigen::Index a = 0; a < average.rows(); ++a) {
+    const Vec3d& axis = axes[static_cast<std::size_t>(a)];
+    double nearest = -1;
+    for (const Incoming& in : incoming) nearest = std::max(nearest, in.direction.dot(axis));
+    double whole = 0;
+    for (Eigen::Index i = 0; i < fine; ++i) {
+      const Incoming& in = incoming[static_cast<std::size_t>(i)];
+      const double cosine = in.direction.dot(axis);
+      const double value = in.solid_angle * std::exp(sharpness * (cosine - nearest));
+      average(a, i) = static_cast<float>(value);
+      whole += value;
+    }
+    average.row(a) /= static_cast<float>(whole);
+  }
+  return average;
+}
+
+// A matrix as left * right^T, of the rank whose singular values sum to `contribution` of all;
+// columns are filled up with 0 to a multiple of 8.
+struct Factors {
+  int rank;
+  RowMajor left;
+  RowMajor right;
+};
+Factors factored(const Eigen::MatrixXf& matrix, double contribution) {
+  // Singular values and right vectors from the smaller Gram matrix.
+  const SymmetricEigen gram = symmetric_eigen((matrix.transpose() * matrix).cast<double>());
+  const Eigen::VectorXd singular = gram.values.cwiseMax(0.0).cwiseSqrt().reverse();
+  double kept = 0;
+  Eigen::Index rank = 0;
+  while (rank < singular.size() && kept < contribution * singular.sum()) kept += singular[rank++];
+  rank = std::max<Eigen::Index>(rank, 1);
+  Factors result;
+  result.rank = static_cast<int>(rank);
+  result.right = RowMajor::Zero(matrix.cols(), static_cast<Eigen::Index>(padded(result.rank)));
+  result.right.leftCols(rank) = gram.vectors.rightCols(rank).rowwise().reverse().cast<float>();
+  result.left = matrix * result.right;
+  return result;
+}
+
+}  // namespace
+
+WeightingTable::WeightingTable(const MicrocylinderFabric& fabric,
+                               std::span<const TangentSample> tangents, Weighting weighting,
+                               const WeightingTableSettings& settings)
+    : columns_(settings.columns), wo_rows_(settings.rows), axis_rows_(2 * settings.rows) {
+  assert(settings.columns >= 4 && settings.rows >= 2 && !tangents.empty());
+  // Directions of light that are averaged, and those of the table, which are the limit of great
+  // sharpness.
+  const std::vector<Incoming> incoming = hemisphere_cells(2 * settings.rows, 2 * settings.columns);
+  const std::vector<Vec3d> axes = grid_nodes(axis_rows_, columns_, kPi);
+  const std::vector<Vec3d> outgoing = grid_nodes(wo_rows_, columns_, kLastPolar);
+  const auto fine = static_cast<Eigen::Index>(incoming.size());
+  const auto coarse = static_cast<Eigen::Index>(axes.size());
+
+  std::vector<Vec3d> lights;
+  for (const Incoming& in : incoming) lights.push_back(in.direction);
+  lights.insert(lights.end(), axes.begin(), axes.end());
+  std::vector<Eigen::MatrixXf> weights = weights_of(fabric, tangents, weighting, lights, outgoing);
+
+  std::vector<Eigen::MatrixXf> averages(kLevels - 1);  // one per finite sharpness
   tbb::parallel_for(0, kLevels - 1, [&](int level) {
     const double sharpness =
         level == 0 ? 0 : static_cast<double>(kSharpnesses[static_cast<std::size_t>(level - 1)]);
-    Eigen::MatrixXf& average = averages[static_cast<std::size_t>(level)];
-    for (Eigen::Index a = 0; a < coarse; ++a) {
-      double nearest = -1;
-      for (const Incoming& in : incoming) {
-        nearest = std::max(nearest, in.direction.dot(axes[static_cast<std::size_t>(a)]));
-      }
-      double whole = 0;
-      for (Eigen::Index i = 0; i < fine; ++i) {
-        const Incoming& in = incoming[static_cast<std::size_t>(i)];
-        const double cosine = in.direction.dot(axes[static_cast<std::size_t>(a)]);
-        const double value = in.solid_angle * std::exp(sharpness * (cosine - nearest));
-        average(a, i) = static_cast<float>(value);
-        whole += value;
-      }
-      average.row(a) /= static_cast<float>(whole);
-    }
+    averages[static_cast<std::size_t>(level)] = gaussian_average(axes, incoming, sharpness);
   });
 
   ranks_.resize(tangents.size());
@@ -226,27 +276,16 @@ WeightingTable::WeightingTable(const MicrocylinderFabric& fabric,
   wo_.resize(tangents.size());
   axis_.resize(tangents.size());
   tbb::parallel_for(std::size_t{0}, tangents.size(), [&](std::size_t t) {
-    Eigen::MatrixXf stacked(kLevels * coarse, seen);
+    Eigen::MatrixXf stacked(kLevels * coarse, static_cast<Eigen::Index>(outgoing.size()));
     for (int level = 0; level < kLevels - 1; ++level) {
       stacked.middleRows(level * coarse, coarse).noalias() =
           averages[static_cast<std::size_t>(level)] * weights[t].topRows(fine);
     }
     stacked.bottomRows(coarse) = weights[t].bottomRows(coarse);
     weights[t].resize(0, 0);
-    // Singular values and right vectors from the smaller Gram matrix.
-    const Eigen::MatrixXd gram = (stacked.transpose() * stacked).cast<double>();
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(gram);
-    const Eigen::VectorXd singular = solver.eigenvalues().cwiseMax(0.0).cwiseSqrt().reverse();
-    double kept = 0;
-    Eigen::Index rank = 0;
-    while (rank < seen && kept < settings.contribution * singular.sum()) kept += singular[rank++];
-    rank = std::max<Eigen::Index>(rank, 1);
-    ranks_[t] = static_cast<int>(rank);
-    stride_[t] = padded(ranks_[t]);
-    using RowMajor = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-    RowMajor right = RowMajor::Zero(seen, static_cast<Eigen::Index>(stride_[t]));
-    right.leftCols(rank) = solver.eigenvectors().rightCols(rank).rowwise().reverse().cast<float>();
-    const RowMajor left = stacked * right;
+    const auto [rank, left, right] = factored(stacked, settings.contribution);
+    ranks_[t] = rank;
+    stride_[t] = padded(rank);
     wo_[t].assign(right.data(), right.data() + right.size());
     axis_[t].assign(left.data(), left.data() + left.size());
   });

@@ -66,30 +66,25 @@ EnergyScale WovenCotton::make_energy_scale() const {
     room -= kPi * pattern.coverage(system) *
             parameters_.yarns[static_cast<std::size_t>(system)].diffuse;
   }
-  return EnergyScale([&](const Vec3d& wo) {
-    Rgbd sum = Rgbd::Zero();
-    for (int n = 0; n < kDraws; ++n) {
-      const Vec3d place = lattice_point(n);
-      const std::optional<Vec3d> wi = draw(place.x(), place.y(), place.z(), wo);
-      if (!wi || !(wi->z() > 0)) continue;
-      const Vec2d half = half_vector(*wi, wo);
-      Rgbd value = Rgbd::Zero();
-      for (std::size_t kind = 0; kind < pattern.kinds().size(); ++kind) {
-        const FloatKind& floats = pattern.kinds()[kind];
-        double area = 0;
-        for (int v = 0; v < variants_; ++v) {
-          const Rectangle whole = {Vec2d::Zero(), floats.size};
-          area += highlight_area(
-              segments_[kind * static_cast<std::size_t>(variants_) + static_cast<std::size_t>(v)],
-              half, whole);
+  return energy_scale_of(
+      [&](const Vec3d& wi, const Vec3d& wo) -> Rgbd {
+        const Vec2d half = half_vector(wi, wo);
+        Rgbd value = Rgbd::Zero();
+        for (std::size_t kind = 0; kind < pattern.kinds().size(); ++kind) {
+          const FloatKind& floats = pattern.kinds()[kind];
+          double area = 0;
+          for (int v = 0; v < variants_; ++v) {
+            const Rectangle whole = {Vec2d::Zero(), floats.size};
+            area += highlight_area(
+                segments_[kind * static_cast<std::size_t>(variants_) + static_cast<std::size_t>(v)],
+                half, whole);
+          }
+          value += floats.share * area / (variants_ * floats.size.prod()) *
+                   parameters_.yarns[static_cast<std::size_t>(floats.system)].specular;
         }
-        value += floats.share * area / (variants_ * floats.size.prod()) *
-                 parameters_.yarns[static_cast<std::size_t>(floats.system)].specular;
-      }
-      sum += value * highlight(*wi, wo) / density(*wi, wo);
-    }
-    return (sum / kDraws / room).maxCoeff();
-  });
+        return value * highlight(wi, wo);
+      },
+      room, kDraws);
 }
 
 double WovenCotton::highlight(const Vec3d& wi, const Vec3d& wo) const {
@@ -186,11 +181,6 @@ double WovenCotton::density(const Vec3d& wi, const Vec3d& wo) const {
   return by_cosine + (1.0 - kCosineShare) * by_half;
 }
 
-float WovenCotton::pdf(const SurfacePoint& /*point*/, const Vec3& wi, const Vec3& wo) const {
-  return static_cast<float>(density(wi.cast<double>(), wo.cast<double>()));
-}
-
-/// The direction that three numbers in [0, 1) stand for; nothing where there is none.
 std::optional<Vec3d> WovenCotton::draw(double choice, double a, double b, const Vec3d& wo) const {
   if (choice < kCosineShare) return cosine_direction(a, b);
   choice = (choice - kCosineShare) / (1.0 - kCosineShare);
@@ -205,21 +195,6 @@ std::optional<Vec3d> WovenCotton::draw(double choice, double a, double b, const 
   const Vec3d h(half.x(), half.y(), std::sqrt(rest));
   if (h.dot(wo) <= 0.0) return std::nullopt;
   return 2.0 * h.dot(wo) * h - wo;
-}
-
-std::optional<SurfaceSample> WovenCotton::sample(const SurfacePoint& point, const Vec3& wo,
-                                                 RandomStream& random) const {
-  const Vec3d out = wo.cast<double>();
-  const double choice = random.uniform_double();
-  const double a = random.uniform_double();
-  const double b = random.uniform_double();
-  const std::optional<Vec3d> wi = draw(choice, a, b, out);
-  if (!wi) return std::nullopt;
-  const double probability = density(*wi, out);
-  if (!(probability > 0.0)) return std::nullopt;
-  const Rgbd value = reflected(point, *wi, out);
-  return SurfaceSample{wi->cast<float>(), (value / probability).cast<float>(),
-                       static_cast<float>(probability)};
 }
 
 WovenCottonParameters read_woven_cotton(const TomlTable& document) {

@@ -22,8 +22,7 @@
 #include <optional>
 #include <vector>
 
-#include "render/surface/energy_scale.h"
-#include "render/surface/surface_model.h"
+#include "render/surface/woven_model.h"
 #include "render/surface/woven_pattern.h"
 #include "render/surface/woven_segment.h"
 
@@ -60,7 +59,7 @@ struct WovenCottonParameters {
   bool energy_safe = false;
 };
 
-class WovenCotton : public SurfaceModel {
+class WovenCotton final : public WovenModel {
  public:
   static constexpr int kVariants = 16;
 
@@ -72,11 +71,6 @@ class WovenCotton : public SurfaceModel {
   /// Adaptive quadrature (integrate_sg_light, its default settings).
   Rgbd reflected_sg(const SurfacePoint& point, const Vec3d& axis, double sharpness,
                     const Vec3d& wo) const override;
-  /// Half the draws by cosine, half by a half vector that is uniform (in x and y) where highlights
-  /// can lie.
-  std::optional<SurfaceSample> sample(const SurfacePoint& point, const Vec3& wo,
-                                      RandomStream& random) const override;
-  float pdf(const SurfacePoint& point, const Vec3& wi, const Vec3& wo) const override;
 
  private:
   // A FootprintPart of one variant.
@@ -92,10 +86,12 @@ class WovenCotton : public SurfaceModel {
   /// Of a highlight, with reflectance and geometry; 1 inside it.
   double highlight(const Vec3d& wi, const Vec3d& wo) const;
   Rgbd reflected_by(const Piece& piece, const Vec2d& half, double cos_i, double reflectance) const;
-  std::optional<Vec3d> draw(double choice, double a, double b, const Vec3d& wo) const;
+  /// Half the draws by cosine, half by a half vector that is uniform (in x and y) where highlights
+  /// can lie.
+  std::optional<Vec3d> draw(double choice, double a, double b, const Vec3d& wo) const override;
+  double density(const Vec3d& wi, const Vec3d& wo) const override;
   EnergyScale make_energy_scale() const;
   const WovenSegment& segment_of(const PlacedFloat& placed) const;
-  double density(const Vec3d& wi, const Vec3d& wo) const;
 
   WovenCottonParameters parameters_;
   int variants_;                        // 1 or kVariants

@@ -299,20 +299,14 @@ EnergyScale WovenYarns::make_energy_scale() const {
   for (const YarnSystem system : {YarnSystem::kWarp, YarnSystem::kWeft}) {
     room -= pattern.coverage(system) * parameters_.yarns[static_cast<std::size_t>(system)].diffuse;
   }
-  return EnergyScale([&](const Vec3d& wo) {
-    Rgbd sum = Rgbd::Zero();
-    for (int n = 0; n < kDraws; ++n) {
-      const Vec3d place = lattice_point(n);
-      const std::optional<Vec3d> wi = draw(place.x(), place.y(), place.z(), wo);
-      if (!wi || !(wi->z() > 0) || !((*wi + wo).norm() > kShortestSum)) continue;
-      Rgbd value = Rgbd::Zero();
-      for (std::size_t kind = 0; kind < segments_.size(); ++kind) {
-        value += far_highlight(kind, *wi, wo) * segments_[kind].material.specular;
-      }
-      sum += value * wi->z() / density(*wi, wo);
-    }
-    return (sum / kDraws / room).maxCoeff();
-  });
+  return energy_scale_of(
+      [&](const Vec3d& wi, const Vec3d& wo) -> Rgbd {
+        Rgbd value = Rgbd::Zero();
+        for (std::size_t kind = 0; kind < segments_.size(); ++kind)
+          value += far_highlight(kind, wi, wo) * segments_[kind].material.specular;
+        return value * wi.z();
+      },
+      room, kDraws);
 }
 
 double WovenYarns::highlight_albedo() const {
@@ -322,12 +316,10 @@ double WovenYarns::highlight_albedo() const {
   double sum = 0.0;
   for (int n = 0; n < kPairs; ++n) {
     const auto coordinate = [n](double step) { return std::fmod((n + 0.5) * step, 1.0); };
-    const auto direction = [](double a, double b) {
-      const double r = std::sqrt(a);
-      return Vec3d(r * std::cos(2.0 * kPi * b), r * std::sin(2.0 * kPi * b), std::sqrt(1.0 - a));
-    };
-    const Vec3d wi = direction(coordinate(0.8566748838545029), coordinate(0.7338918566271260));
-    const Vec3d wo = direction(coordinate(0.6287067210378087), coordinate(0.5385972572236101));
+    const Vec3d wi =
+        cosine_direction(coordinate(0.8566748838545029), coordinate(0.7338918566271260));
+    const Vec3d wo =
+        cosine_direction(coordinate(0.6287067210378087), coordinate(0.5385972572236101));
     for (std::size_t k = 0; k < segments_.size(); ++k) sum += far_highlight(k, wi, wo);
   }
   return kPi * sum / kPairs;
@@ -392,11 +384,6 @@ double WovenYarns::density(const Vec3d& wi, const Vec3d& wo) const {
   return by_cosine + (1.0 - kCosineShare) * by_half / (2.0 * length);
 }
 
-float WovenYarns::pdf(const SurfacePoint& /*point*/, const Vec3& wi, const Vec3& wo) const {
-  return static_cast<float>(density(wi.cast<double>(), wo.cast<double>()));
-}
-
-/// The direction that three numbers in [0, 1) stand for; nothing where there is none.
 std::optional<Vec3d> WovenYarns::draw(double choice, double a, double b, const Vec3d& wo) const {
   if (choice < kCosineShare) return cosine_direction(a, b);
   const YarnSystem system =
@@ -407,21 +394,6 @@ std::optional<Vec3d> WovenYarns::draw(double choice, double a, double b, const V
   const Vec3d h = to_cloth(system, {x, rest * std::sin(inclination), rest * std::cos(inclination)});
   if (h.dot(wo) <= 0.0) return std::nullopt;
   return 2.0 * h.dot(wo) * h - wo;
-}
-
-std::optional<SurfaceSample> WovenYarns::sample(const SurfacePoint& point, const Vec3& wo,
-                                                RandomStream& random) const {
-  const Vec3d out = wo.cast<double>();
-  const double choice = random.uniform_double();
-  const double a = random.uniform_double();
-  const double b = random.uniform_double();
-  const std::optional<Vec3d> wi = draw(choice, a, b, out);
-  if (!wi) return std::nullopt;
-  const double probability = density(*wi, out);
-  if (!(probability > 0.0)) return std::nullopt;
-  const Rgbd value = reflected(point, *wi, out);
-  return SurfaceSample{wi->cast<float>(), (value / probability).cast<float>(),
-                       static_cast<float>(probability)};
 }
 
 WovenYarnsParameters read_woven_yarns(const TomlTable& document) {

@@ -22,8 +22,7 @@
 #include <array>
 #include <vector>
 
-#include "render/surface/energy_scale.h"
-#include "render/surface/surface_model.h"
+#include "render/surface/woven_model.h"
 #include "render/surface/woven_pattern.h"
 
 namespace heddle {
@@ -83,7 +82,7 @@ struct WovenYarnsParameters {
 
 /// Each system's highlight is divided by its coverage, so that the far value is the sum of the two
 /// systems' means. Near and far meet as in woven_cotton.h, in WovenPattern::visit_footprint.
-class WovenYarns : public SurfaceModel {
+class WovenYarns final : public WovenModel {
  public:
   explicit WovenYarns(WovenYarnsParameters parameters);
 
@@ -93,18 +92,15 @@ class WovenYarns : public SurfaceModel {
   /// Adaptive quadrature (integrate_sg_light) to 1 %.
   Rgbd reflected_sg(const SurfacePoint& point, const Vec3d& axis, double sharpness,
                     const Vec3d& wo) const override;
-  /// Half the draws by cosine, half by a half vector perpendicular to the spine at an even
-  /// inclination.
-  std::optional<SurfaceSample> sample(const SurfacePoint& point, const Vec3& wo,
-                                      RandomStream& random) const override;
-  float pdf(const SurfacePoint& point, const Vec3& wi, const Vec3& wo) const override;
 
  private:
-  double density(const Vec3d& wi, const Vec3d& wo) const;
+  /// Half the draws by cosine, half by a half vector perpendicular to the spine at an even
+  /// inclination.
+  std::optional<Vec3d> draw(double choice, double a, double b, const Vec3d& wo) const override;
+  double density(const Vec3d& wi, const Vec3d& wo) const override;
   double highlight_albedo() const;
   /// Mean highlight of all segments of a kind, scaled.
   double far_highlight(std::size_t kind, const Vec3d& wi, const Vec3d& wo) const;
-  std::optional<Vec3d> draw(double choice, double a, double b, const Vec3d& wo) const;
   EnergyScale make_energy_scale() const;
 
   WovenYarnsParameters parameters_;

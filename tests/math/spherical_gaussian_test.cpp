@@ -83,5 +83,33 @@ TEST(SphericalGaussianStability, OppositeEqualGaussiansGiveAConstant) {
   EXPECT_EQ(nothing.log_scale, 0.0);
 }
 
+// A uniform distribution is the limit of little sharpness; the first term of the difference is
+// known: depth = 2 share - 2 sharpness share (1 - share).
+TEST(SphericalGaussian, DepthOfAShareNearsTheUniformDistributionSmoothly) {
+  for (const double sharpness : {0.0, 1e-300, 1e-17, 1e-15, 1e-10, 1e-7, 1e-5}) {
+    for (const double share : {0.0, 0.01, 0.3, 0.9, 1.0}) {
+      const double expected = 2 * share - 2 * sharpness * share * (1 - share);
+      EXPECT_NEAR(sg_depth_of_share(share, sharpness), expected, 1e-15 + 4 * sharpness * sharpness)
+          << sharpness << " " << share;
+    }
+  }
+}
+
+TEST(SphericalGaussian, DepthOfAShareAndShareWithinAreInverse) {
+  for (const double sharpness : {0.0, 1e-16, 1e-12, 1e-3, 1.0, 30.0, 1e4, 1e8}) {
+    EXPECT_EQ(sg_share_within(0, sharpness), 0) << sharpness;
+    EXPECT_EQ(sg_share_within(2, sharpness), 1) << sharpness;
+    for (const double share : {1e-6, 0.1, 0.5, 0.99}) {
+      const double depth = sg_depth_of_share(share, sharpness);
+      EXPECT_GT(depth, 0);
+      EXPECT_LT(depth, 2);
+      EXPECT_NEAR(sg_share_within(depth, sharpness) / share, 1, 1e-12) << sharpness << " " << share;
+    }
+  }
+  // Half a turn from the axis is as far as any share goes.
+  for (const double sharpness : {0.0, 1e-3, 30.0, 1e8})
+    EXPECT_NEAR(sg_depth_of_share(1, sharpness), 2, 1e-3) << sharpness;
+}
+
 }  // namespace
 }  // namespace heddle

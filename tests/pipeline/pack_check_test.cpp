@@ -49,9 +49,6 @@ TEST(PackCheck, EveryNumberedCheckCanFail) {
     std::function<void(FabricPack&)> apply;
   };
   const Damage damages[] = {
-      {"fibers.safetensors: check 6",
-       [](FabricPack& p) { p.exemplar.scattering[0].color_r[1] = 1.5; }},
-      {"fibers.safetensors: check 6", [](FabricPack& p) { p.exemplar.scattering[0].beta_tt = 0; }},
       {"ssdf.safetensors: check 8", [](FabricPack& p) { p.ssdf->mean[2] = 4; }},
       {"sg.safetensors: check 9", [](FabricPack& p) { p.sgs->weights[0] = half_from_float(13); }},
       {"transfer.safetensors: check 10",
