@@ -1,13 +1,14 @@
 #ifndef HEDDLE_RENDER_CLOTH_SCENE_H_
 #define HEDDLE_RENDER_CLOTH_SCENE_H_
-// All cloth and all meshes of a scene in world space (millimetres): rays through the shell maps
-// against the explicit fibers (or whatever a query finds in fabric space), and macroscopic
-// visibility against shells and meshes. Meshes are surface cloths and black meshes; fibers see both
-// as black.
+// All cloth and all meshes of a scene in world space (millimetres). It traces rays through the
+// shell maps against the explicit fibers, or against whatever a query finds in fabric space. It
+// also answers macroscopic visibility against shells and meshes. Meshes are surface cloths and
+// black meshes. Fibers see both as black.
 //
-// Shells may overlap in space; a ray visits all of them. Only a ray that starts inside one shell
-// does not see what another shell holds around its very origin. Fabric coordinates are folded into
-// the base tile in double before they become floats. Tested in tests/render/cloth_scene_test.cpp.
+// Shells may overlap in space, and a ray visits all of them. Only a ray that starts inside one
+// shell does not see what another shell holds around its very origin. Fabric coordinates are folded
+// into the base tile in double before they become floats. Tested in
+// tests/render/cloth_scene_test.cpp.
 
 #include <algorithm>
 #include <atomic>
@@ -86,9 +87,9 @@ class ClothScene {
   }
   std::vector<FiberScattering> materials() const { return materials_; }
 
-  /// First thing that `query` finds along the ray. query(cloth, ray, own_fiber) ->
-  /// std::optional<FiberHit> looks along a fabric-space ray from its origin to t_max (own_fiber is
-  /// kNoFiber or the fiber to ignore).
+  /// The first hit of `query` along the ray. query(cloth, ray, own_fiber) ->
+  /// std::optional<FiberHit> looks along a fabric-space ray from its origin to t_max. own_fiber is
+  /// kNoFiber or the fiber to ignore.
   template <class Query>
   std::optional<ShellHit> first_hit(const SceneRay& ray, RayReach reach, Query&& query) const;
 
@@ -167,9 +168,9 @@ class ClothScene {
   static constexpr double kShortestMm = 1e-7;
   static constexpr double kMarginMm = 1e-6;
 
-  // Calls visit(cloth, interval, own_fiber) -> bool (true stops the walk through this shell) for
-  // the shells in order of where the ray enters them; `limit` may shrink meanwhile, and nothing
-  // that starts beyond it is visited.
+  // Calls visit(cloth, interval, own_fiber) -> bool for the shells in order of where the ray enters
+  // them; true stops the walk through this shell. `limit` may shrink meanwhile, and nothing that
+  // starts beyond it is visited.
   template <class Visit>
   void walk(const SceneRay& ray, RayReach reach, const double& limit, Visit&& visit) const;
 

@@ -1,12 +1,12 @@
 #ifndef HEDDLE_RENDER_CLOTH_TRACE_H_
 #define HEDDLE_RENDER_CLOTH_TRACE_H_
-// Shell-mapped cloth as a Trace for walk_path; directions and tangents are world space.
+// Shell-mapped cloth as a Trace for walk_path. Directions and tangents are in world space.
 //
-// A scattered ray ignores its own fiber until it has left the shell it starts in; then it may enter
+// A scattered ray ignores its own fiber until it has left the shell it starts in. Then it may enter
 // this shell again or another. A path that may not go on ends at a vertex with `is_end` set: on a
 // mesh, or (local) where it would meet cloth again after leaving its shell. So a path escapes
-// where, and only where, its last ray is not occluded: light found by escaping and light found by
-// shadow rays are the same integral. Tested in tests/render/cloth_trace_test.cpp.
+// exactly if its last ray is not occluded. Light found by escaping and light found by shadow rays
+// are then the same integral. Tested in tests/render/cloth_trace_test.cpp.
 
 #include <cstdint>
 #include <optional>

@@ -3,12 +3,12 @@
 // Light from infinity as a latitude-longitude picture: radiance, constant on each pixel.
 //
 // Row 0 is at +z (up), the last one at -z, each of equal height in polar angle. The middle of the
-// picture looks along +x, and the view from inside is not mirrored: a quarter of the width to the
-// right looks along -y, to the left along +y, and the seam along -x. Azimuth atan2(y, x) = pi (1 -
-// 2 u) with u from 0 (left) to 1. Blender has the same convention.
+// picture looks along +x. The view from inside is not mirrored: a quarter of the width to the right
+// looks along -y, to the left along +y, and the seam along -x. Azimuth atan2(y, x) = pi (1 - 2 u)
+// with u from 0 (left) to 1. Blender has the same convention.
 //
-// Because pixels are constant, the integral, the density of sampling and averages over areas are
-// all exact. Thread-safe. Tested in tests/render/environment_map_test.cpp.
+// Pixels are constant, so the integral, the density of sampling and averages over areas are all
+// exact. Thread-safe. Tested in tests/render/environment_map_test.cpp.
 
 #include <filesystem>
 #include <vector>

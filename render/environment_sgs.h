@@ -1,17 +1,17 @@
 #ifndef HEDDLE_RENDER_ENVIRONMENT_SGS_H_
 #define HEDDLE_RENDER_ENVIRONMENT_SGS_H_
 // An environment as a sum of spherical Gaussian lights, nearest to its blurred radiance in the
-// least-squares sense: the lighting of Iwasaki et al. 2014 (section 3), and a list of lights that
-// every renderer takes.
+// least-squares sense. It is the lighting of Iwasaki et al. 2014 (section 3), and a list of lights
+// that every renderer takes.
 //
 // The published text does not say how its Gaussians are found. Here the map is first blurred by a
-// Gaussian of sharpness kEnvironmentBlur (5 degrees): without, one sun of a few pixels takes all
-// Gaussians, and the light that cloth receives is off by half. Then one Gaussian at a time, each
-// the one of a fixed set of axes and sharpnesses that takes most off the error; after each, all
-// axes, sharpnesses and colours are moved together by Levenberg-Marquardt steps, with colours kept
-// at or above 0 by non-negative least squares. First on 64 x 32 pixels, at the end on 128 x 64. At
-// last the blur is taken out of the sharpnesses, up to kSharpestLight. No random numbers: equal
-// maps give equal lights. 0.3 s for 10 Gaussians, 4 s for 64. Tested in
+// Gaussian of sharpness kEnvironmentBlur (5 degrees). Otherwise one sun of a few pixels takes all
+// Gaussians, and the light that cloth receives is off by half. Gaussians are added one at a time.
+// Each is taken from a fixed set of axes and sharpnesses, and lowers the error most. After each,
+// all axes, sharpnesses and colours are moved together by Levenberg-Marquardt steps. Non-negative
+// least squares keeps colours at or above 0. This runs on 64 x 32 pixels first, and at the end on
+// 128 x 64. At last the blur is taken out of the sharpnesses, up to kSharpestLight. There are no
+// random numbers: equal maps give equal lights. 0.3 s for 10 Gaussians, 4 s for 64. Tested in
 // tests/render/environment_sgs_test.cpp; errors for real maps: docs/surface-models.md.
 
 #include <vector>

@@ -1,12 +1,13 @@
 #ifndef HEDDLE_RENDER_FLIP_H_
 #define HEDDLE_RENDER_FLIP_H_
-// How different two pictures look when one is swapped for the other at its place on a screen: 0 =
-// no difference seen, 1 = as large as it gets. Andersson et al. 2020, "FLIP: A Difference Evaluator
-// for Alternating Images", its low-dynamic-range form: per pixel, colour difference (filtered by
-// the eye's contrast sensitivity, HyAB distance in Hunt-adjusted L*a*b*) raised to 1 - (difference
-// of edges and points). Input is scene-linear Rec.709; like the screen, it is clipped to [0, 1].
-// The sums of Gaussians that filter the three channels are as printed (table 1). Beyond the rim,
-// pixels repeat. Symmetric in its two pictures. Tested in tests/render/flip_test.cpp.
+// How different two pictures look when one is swapped for the other at its place on a screen. 0 is
+// no visible difference, 1 the largest. Andersson et al. 2020, "FLIP: A Difference Evaluator for
+// Alternating Images", low-dynamic-range form. Per pixel it is the colour difference raised to 1 -
+// (difference of edges and points). The colour difference is filtered by the eye's contrast
+// sensitivity and is the HyAB distance in Hunt-adjusted L*a*b*. Input is scene-linear Rec.709; like
+// the screen, it is clipped to [0, 1]. The sums of Gaussians that filter the three channels are as
+// printed (table 1). Beyond the rim, pixels repeat. Symmetric in its two pictures. Tested in
+// tests/render/flip_test.cpp.
 
 #include <span>
 #include <vector>

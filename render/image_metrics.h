@@ -1,8 +1,8 @@
 #ifndef HEDDLE_RENDER_IMAGE_METRICS_H_
 #define HEDDLE_RENDER_IMAGE_METRICS_H_
 // How far a picture is from a reference. Relative RMSE over n values = sqrt(mean d^2) / mean
-// reference, with d^2 = (F - R0)(F - R1) for two independent halves of the reference, so that its
-// noise does not count (design of the errors: per-value relative errors explode on dark values).
+// reference, with d^2 = (F - R0)(F - R1) for two independent halves of the reference. So the noise
+// of the reference does not count. Errors relative to each value would explode on dark values.
 // Values are colour channels of pixels. Tested in tests/render/image_metrics_test.cpp.
 
 #include <cstdint>
@@ -34,11 +34,11 @@ struct PictureError {
 PictureError compare_pictures(std::span<const Rgb> picture, const HalvedReference& reference,
                               std::span<const std::uint8_t> mask);
 
-/// What a chart says of a picture: the errors of compare_pictures with the interval in which they
-/// lie, and how bad the worst values are. Intervals are 95 % (1.96 standard errors) from a
-/// delete-one jackknife over blocks of pixels, which hold what neighbours have in common (a
-/// kernel's width of noise, a fold that all get wrong); the mean square is what is jackknifed, as
-/// its root is far from normal where the error is near the noise.
+/// What a chart says of a picture: the errors of compare_pictures with their intervals, and the
+/// size of the worst. Intervals are 95 % (1.96 standard errors) from a delete-one jackknife over
+/// blocks of pixels. A block holds what neighbours have in common: noise as wide as a kernel, a
+/// fold that all get wrong. The jackknife takes the mean square, because its root is far from
+/// normal for errors near the noise.
 struct PictureErrorEstimate {
   double relative_rmse = 0;
   double rmse_low = 0;  // 0 where the error cannot be told from none
@@ -55,18 +55,18 @@ struct PictureErrorEstimate {
 PictureErrorEstimate estimate_error(std::span<const Rgb> picture, const HalvedReference& reference,
                                     int width, int height, int edge);
 
-/// The noise of a reference in two halves, relative to its mean: of the mean of both halves, root
-/// mean square, and the 99th percentile of its magnitude. What is left of an error of this size in
-/// a percentile says nothing.
+/// The noise of a reference in two halves, relative to its mean. It is that of the mean of both
+/// halves: root mean square, and the 99th percentile of its magnitude. A percentile of an error
+/// that is no larger says nothing.
 struct ReferenceNoise {
   double rms = 0;
   double percentile99 = 0;
 };
 ReferenceNoise reference_noise(const HalvedReference& reference);
 
-/// Per-pixel relative RMSE of a picture whose only error is noise: root of the mean over pixels of
-/// (channel mean of the variance of the pixel's mean) / (channel mean of the reference)^2, where
-/// the reference has light.
+/// Per-pixel relative RMSE of a picture whose only error is noise. It is the root of the mean, over
+/// pixels in which the reference has light, of (channel mean of the variance of the pixel's mean) /
+/// (channel mean of the reference)^2.
 double relative_noise(std::span<const Rgb> variance, std::span<const Rgb> reference,
                       std::span<const std::uint8_t> mask);
 

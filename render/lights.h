@@ -2,7 +2,7 @@
 #define HEDDLE_RENDER_LIGHTS_H_
 // Lights at infinity: directional ones, and spherical Gaussians L(w) = irradiance G(w; axis,
 // sharpness) / M(sharpness). `irradiance` is the integral of L over all directions, measured
-// perpendicular to the axis; sharpness 0 is constant light from everywhere with L = irradiance / 4
+// perpendicular to the axis. Sharpness 0 is constant light from everywhere with L = irradiance / 4
 // pi. An environment is a picture of the light from all around (environment_map.h), turned about
 // the z axis. Tested in tests/render/lights_test.cpp.
 
@@ -33,8 +33,8 @@ struct Light {
   bool is_directional() const { return type == LightType::kDirectional; }
 };
 
-/// How light is found: by shadow rays alone, by directions drawn from what scatters alone (which
-/// never meet a directional light), or both, weighted by the power heuristic.
+/// How light is found: by shadow rays alone, by directions drawn from the scattering alone, or by
+/// both, weighted by the power heuristic. Drawn directions never meet a directional light.
 enum class LightEstimator : std::uint8_t { kShadowRays, kEscapes, kCombined };
 
 /// Radiance from `direction`; 0 for directional lights, which no direction drawn otherwise can
@@ -51,9 +51,9 @@ LightSample sample_light(const Light& light, RandomStream& random);
 /// Density (1/sr) with which sample_light draws `direction`; 0 for directional lights.
 float light_pdf(const Light& light, const Vec3& direction);
 
-/// Lights for methods that know directional and Gaussian ones only: every environment as the
-/// Gaussians fitted to it. relative_error: of the worst fit, 0 without environments
-/// (environment_sgs.h).
+/// Lights for methods that know only directional and Gaussian ones: every environment as the
+/// Gaussians fitted to it. relative_error is that of the worst fit (environment_sgs.h), 0 without
+/// environments.
 struct FittedLights {
   std::vector<Light> lights;
   double relative_error = 0;

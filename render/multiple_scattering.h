@@ -6,23 +6,25 @@
 //
 //   c_light[j]   directional: Y_j(w); spherical Gaussian: A_l(sharpness) Y_lm(axis)
 //   c_T          = a^T c_light: the indirect light that arrives at the cell (Transfer::incoming)
-//   outgoing     = c_S(theta_o) . D(R) c_T: rotated into the wo-space (x = tangent, wo in the xy
-//                plane, y > 0) of the
-//                  BCSDF's coefficients
+//   outgoing     = c_S(theta_o) . D(R) c_T: rotated into the wo-space of the BCSDF's coefficients
+//                  (x = tangent, wo in the xy plane, y > 0)
 //
 // A truncated expansion rings: an incoming field, and with it the outgoing radiance, can be
-// slightly negative. Signs are kept, so that sums over samples have the expansion's mean; who shows
-// a picture may clamp it. Under light from the face only, the transfer is known, and asked for,
-// above the horizon only: its stored coefficients are moments over the upper hemisphere, and light
-// is projected onto their dual (fibers/math/hemisphere_dual.h): c_light = G^+ integral over z > 0
-// of L Y_j. Taking the coefficients for those of a function that is 0 below the horizon, as
-// printed, loses light near it (flat gabardine, light at 70 degrees: 13 % too dark); an odd
-// continuation below it is better, the dual better still (docs/performance.md). Where the transfer
-// keeps light on cones apart (fibers/baked/cone_transfer.h), it is taken out of the harmonics and
-// scattered on its own, per light: the Gaussian about the light's cone, widened by the light's own,
-// times the fiber's lobes, in closed form in inclination and by kAzimuthNodes points in azimuth
-// about the bundle. Lights so soft that the harmonics hold them do without (cone_share). Tested in
-// tests/render/multiple_scattering_test.cpp.
+// slightly negative. Signs are kept, so that sums over samples have the expansion's mean. Whoever
+// shows a picture may clamp it.
+//
+// With light from the face only, the transfer is known, and used, above the horizon only. Its
+// stored coefficients are moments over the upper hemisphere. Light is projected onto their dual
+// (fibers/math/hemisphere_dual.h): c_light = G^+ integral over z > 0 of L Y_j. The printed form
+// takes them for coefficients of a function that is 0 below the horizon. That loses light near it:
+// 13 % on flat gabardine under light at 70 degrees. An odd continuation below the horizon is
+// better, the dual better still (docs/performance.md).
+//
+// A transfer may keep light on cones apart (fibers/baked/cone_transfer.h). It is then taken out of
+// the harmonics and scattered on its own, per light. The Gaussian about the light's cone, widened
+// by the light's own, is multiplied by the fiber's lobes: in closed form in inclination, and by
+// kAzimuthNodes points in azimuth about the bundle. Lights that are soft enough for the harmonics
+// do without (cone_share). Tested in tests/render/multiple_scattering_test.cpp.
 
 #include <array>
 #include <optional>
@@ -55,9 +57,9 @@ class MultipleScattering {
                      std::span<const Vec3> bundle_tangent = {})
       : transfer_(&transfer), materials_(materials), bundle_tangent_(bundle_tangent) {}
 
-  /// A light's shape, computed once for all samples: band factors A_l for light from both sides,
-  /// and for light from the face a table of the moments over the upper hemisphere by the
-  /// inclination of the axis. Without a sharpness: directional.
+  /// A light's shape, computed once for all samples. For light from both sides it is the band
+  /// factors A_l. For light from the face it is a table of the moments over the upper hemisphere by
+  /// the inclination of the axis. Without a sharpness: directional.
   class LightShape {
    public:
     /// How light is projected where the fabric takes it from its face only.
@@ -68,8 +70,8 @@ class MultipleScattering {
     explicit LightShape(std::optional<float> sharpness, FaceLight face_light = FaceLight::kDual);
 
     /// Share of the light on cones that is scattered as such; the rest is left in the harmonics.
-    /// From 0 at sharpness 8 to 1 at 20: on flat silk, harmonics alone err less at 8 (9.0
-    /// against 10.8 % of multiple scattering), cones at 30 (14 against 27 %).
+    /// From 0 at sharpness 8 to 1 at 20. On flat silk, errors of multiple scattering at sharpness 8
+    /// are 9.0 % by harmonics alone and 10.8 % by cones; at 30 they are 27 % and 14 %.
     float cone_share() const { return cone_share_; }
     /// Variance that the light's own width adds to a cone's.
     float variance() const { return variance_; }
@@ -78,8 +80,8 @@ class MultipleScattering {
     void project(int order, bool both_sides, const Vec3& axis, float* coefficients) const;
 
    private:
-    // Rows of upper_, for axis inclinations from +z in equal steps; between them, linear
-    // interpolation (error below 2e-3 of the largest coefficient, as its test measures).
+    // Rows of upper_, for axis inclinations from +z in equal steps. Between them, interpolation is
+    // linear, with an error below 2e-3 of the largest coefficient (measured by its test).
     static constexpr int kInclinations = 129;
     /// Integrals over z > 0 of the normalised Gaussian about `axis` times Y_j: [sh_count(order)].
     void moments_above(int order, const Vec3& axis, float* moments) const;

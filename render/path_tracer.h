@@ -1,15 +1,15 @@
 #ifndef HEDDLE_RENDER_PATH_TRACER_H_
 #define HEDDLE_RENDER_PATH_TRACER_H_
 // The reference: eye paths among the shell-mapped explicit fibers, by the same walk and the same
-// BCSDF as the transfer stage, with the light found by shadow rays at every vertex and by paths
-// that escape, combined by the power heuristic (Veach 1997). `single` is light scattered once,
+// BCSDF as the transfer stage. Light is found by shadow rays at every vertex and by paths that
+// escape. The power heuristic combines them (Veach 1997). `single` is light scattered once,
 // `multiple` the rest.
 //
-// Local pictures (paths end where they leave the shell) keep the shadows of all cloth and meshes:
-// what the precomputed methods claim to match. Surface cloths are lit directly, past the fibers
-// (surface_cloth.h). Random numbers are addressed by (seed, pixel of the full frame, sample) and
-// sums run in sample order, so a picture depends neither on threads nor on the crop. Tested in
-// tests/render/path_tracer_test.cpp.
+// In local pictures, paths end where they leave the shell, but the shadows of all cloth and meshes
+// stay. That is what the precomputed methods claim to match. Surface cloths are lit directly, past
+// the fibers (surface_cloth.h). Random numbers are addressed by (seed, pixel of the full frame,
+// sample) and sums run in sample order. So a picture depends neither on threads nor on the crop.
+// Tested in tests/render/path_tracer_test.cpp.
 
 #include <cstdint>
 #include <functional>
@@ -62,7 +62,7 @@ class PathTracer {
 /// BCSDF tables of all materials of a scene.
 std::vector<BcsdfTable> scene_materials(const ClothScene& scene);
 
-/// Either a number of samples per pixel (even, at least 2) or a time; a timed picture is made of
+/// Either a number of samples per pixel (even, at least 2) or a time. A timed picture is made of
 /// whole passes of two samples per pixel, at least one. `more` may lengthen it.
 struct SampleBudget {
   int spp = 2;

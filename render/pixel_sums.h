@@ -1,7 +1,7 @@
 #ifndef HEDDLE_RENDER_PIXEL_SUMS_H_
 #define HEDDLE_RENDER_PIXEL_SUMS_H_
 // One eye ray's result, and the sums of a pixel's eye rays that become its place in the frame
-// buffers: the same for the path tracer and the precomputed methods. Sums run in the order of the
+// buffers. The path tracer and the precomputed methods share them. Sums run in the order of the
 // calls. Tested in tests/render/path_tracer_test.cpp and precomputed_renderer_test.cpp.
 
 #include "fibers/math/vector.h"

@@ -1,10 +1,12 @@
 #ifndef HEDDLE_RENDER_RENDER_OUTPUT_H_
 #define HEDDLE_RENDER_RENDER_OUTPUT_H_
-// The buffers of a picture and their form as image layers: beauty R, G, B, A; single.*, multiple.*;
-// half0.*, half1.* and Variance.* of the path tracer; of the precomputed methods segment, cell
-// (ids, 0xffffffff = none, as on surface cloths), u, v, w (fabric position of the hit, mm), Z
-// (distance along the view direction, mm; 0 = nothing hit), tangent.X/Y/Z (world). Row-major, row 0
-// at the top. Tested in tests/render/render_output_test.cpp.
+// The buffers of a picture and their form as image layers, row-major, row 0 at the top:
+//   all methods            beauty R, G, B, A; single.*, multiple.*
+//   with halves            half0.*, half1.*, Variance.*
+//   precomputed methods    segment, cell (ids, 0xffffffff = none, as on surface cloths)
+//                          u, v, w (fabric position of the hit, mm), tangent.X/Y/Z (world)
+//                          Z (distance along the view direction, mm; 0 = nothing hit)
+// Tested in tests/render/render_output_test.cpp.
 
 #include <cstdint>
 #include <filesystem>
@@ -53,13 +55,13 @@ struct FrameBuffers {
   }
 };
 
-/// Asked with the picture so far, once the samples that were asked for are done: how many more per
-/// pixel (even where paths are traced); 0 ends the picture. It is the same as if all its samples
-/// had been asked for at once.
+/// Asked with the picture so far, once the requested samples are done. Returns how many more per
+/// pixel (an even number if paths are traced); 0 ends the picture. The result is the same as if all
+/// its samples had been asked for at once.
 using MoreSamples = std::function<int(const FrameBuffers&)>;
 
-/// Bytes of memory that a picture takes at its peak: the sums of its pixels with the frame that
-/// they are stored in, or that with the image that is written, whichever is more.
+/// Bytes of memory that a picture takes at its peak. That is the frame, with either the sums of its
+/// pixels or the image that is written, whichever is more.
 std::uint64_t picture_bytes(int width_px, int height_px, int spp, bool with_fiber_layers);
 
 Image image_of(const FrameBuffers& frame, const std::map<std::string, std::string>& metadata);

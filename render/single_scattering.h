@@ -4,25 +4,28 @@
 // light at a time (Khungurn 2017, section 5.2). Results are radiance for a light of irradiance 1,
 // before macroscopic shadows.
 //
-// A directional light along w:      V(w) S(w, wo) cos(theta_w), V = 1 where the signed distance to
-// the edge of visibility is > 0. A spherical Gaussian (axis xi, sharpness l, mass M(l)) is blended
-// linearly in l over [10, 20] (VisibilityBlend) between
+// A directional light along w gives V(w) S(w, wo) cos(theta_w), with V = 1 where the signed
+// distance to the edge of visibility is > 0. A spherical Gaussian (axis xi, sharpness l, mass M(l))
+// is blended linearly in l over [10, 20] (VisibilityBlend) between
 //   soft:   1 / M(l) sum over lobes q of w_q / M(s) exp(n_q - s - l) Gamma(v_q / n_q, n_q, wo),
 //           v_q = s xi_q + l xi, n_q = |v_q|, s the lobes' sharpness;
-//   sharp:  1 / M(l) sum over the fiber's lobes X = R, TT of Gamma_X(xi, l, wo) U_X, U_X the share
-//           of a Gaussian about the mean of light times lobe that comes through: E[(1 + erf(sqrt(p
-//           / 2) d)) / 2], p the product's precision in inclination, d the signed distance, the
-//           mean taken over the product's azimuths.
-// The paper looks d up at xi, with l for p (SgMethod::kPrinted), whatever the fiber takes of that
-// light; a fiber's lobe is much narrower in inclination than a soft light. Errors of both:
+//   sharp:  1 / M(l) sum over the fiber's lobes X = R, TT of Gamma_X(xi, l, wo) U_X,
+//           U_X = E[(1 + erf(sqrt(p / 2) d)) / 2]
+// U_X is the visible share of a Gaussian about the mean of light times lobe. p is the precision of
+// that product in inclination, and d the signed distance. The mean E is over the product's
+// azimuths.
+//
+// The paper looks d up at xi, with l for p (SgMethod::kPrinted), whatever part of that light the
+// fiber uses. But a fiber's lobe is much narrower in inclination than a soft light. Errors of both:
 // docs/performance.md.
 //
-// Two spaces. Draped cloth is a bent copy of the flat exemplar: BCSDF and Gamma take world-space
-// unit vectors (angles as they are in the picture), signed distances are looked up in fabric space,
-// where they were baked. The lobes of the soft branch live in fabric space too, and a product of
-// lobe and light only makes sense in one space, so all of that branch, Gamma included, is evaluated
-// in fabric space. Gamma is what BcsdfTable::sg_scatter computes, or the printed form
-// (sg_scatter.h); their errors are stated there. Tested in tests/render/single_scattering_test.cpp.
+// There are two spaces, because draped cloth is a bent copy of the flat exemplar. BCSDF and Gamma
+// take world-space unit vectors, with angles as they are in the picture. Signed distances are
+// looked up in fabric space, where they were baked. The lobes of the soft branch live in fabric
+// space too. A product of lobe and light only makes sense in one space, so all of that branch,
+// Gamma included, is evaluated in fabric space. Gamma is BcsdfTable::sg_scatter, or the printed
+// form (sg_scatter.h); their errors are stated there. Tested in
+// tests/render/single_scattering_test.cpp.
 
 #include <compare>
 #include <span>

@@ -4,12 +4,13 @@
 // other cloth scatters onto it, and light that it scatters on, is left out.
 //
 // Patch frame of a point (surface_model.h): z = the interpolated normal of the side that is looked
-// at, x = the way that u grows, made perpendicular to z, y = z x x; right-handed from both sides
-// and for mirrored UVs too. position_mm runs along the frame: its y falls with v where y points
-// against it. So the back shows what the face would show there: the model has one face.
+// at, x = the direction in which u grows, made perpendicular to z, y = z x x. It is right-handed
+// from both sides and for mirrored UVs too. position_mm runs along the frame: its y falls with v
+// where y points against it. So the back shows what the face would show there: the model has one
+// face.
 //
-// Where an interpolated normal turns away from the eye though its triangle does not, it is bent
-// back to the eye (kLeastCosine). Tested in tests/render/surface_cloth_test.cpp.
+// If an interpolated normal turns away from the eye but its triangle does not, it is bent back to
+// the eye (kLeastCosine). Tested in tests/render/surface_cloth_test.cpp.
 
 #include <array>
 #include <cstdint>
@@ -65,9 +66,9 @@ class SurfaceCloth {
 /// Is the hit point open towards a world direction?
 using OpenTowards = std::function<bool(const Vec3& direction)>;
 
-/// Radiance that leaves the hit towards `wo` (world) of light that arrives straight from the
-/// lights: one shadow ray per light, and one for a direction drawn from the model that stands for
-/// all Gaussian lights.
+/// Radiance towards `wo` (world) of light that arrives straight from the lights. It takes one
+/// shadow ray per light. One more, for a direction drawn from the model, stands for all Gaussian
+/// lights.
 Rgb surface_direct_light(const SurfaceHit& hit, const Vec3& wo, std::span<const Light> lights,
                          LightEstimator estimator, RandomStream& random, const OpenTowards& open);
 

@@ -1,23 +1,26 @@
 #ifndef HEDDLE_RENDER_RIVALS_BCSDF_FACTORS_H_
 #define HEDDLE_RENDER_RIVALS_BCSDF_FACTORS_H_
 // A fiber's BCSDF times cos(theta_i) as a matrix over directions (wi, wo), cut to the R largest
-// terms of its singular value decomposition, sum over r of g_r(wi) h_r(wo): the factored BRDF of
-// Tsai and Shih 2006, one decomposition per colour.
+// terms of its singular value decomposition, sum over r of g_r(wi) h_r(wo). This is the factored
+// BRDF of Tsai and Shih 2006, with one decomposition per colour.
 //
-// The matrix's symmetry does most of the work. S depends on azimuths through phi_o - phi_i only, so
-// on a lattice equally spaced in azimuth Fourier modes cos(m (phi_o - phi_i)) split the matrix into
-// blocks over (theta_i, theta_o) (m = 0 once, m > 0 twice, as cos cos and sin sin): the singular
-// values of the blocks are the matrix's. Mode 0 holds R and TT; every other mode is the block of TT
-// times a number, so there are two decompositions per colour, whatever the number of azimuths. What
-// is cut depends on what is decomposed. kWeighted: S cos(theta_i) times the square roots of the two
-// solid angles, for which the cut is the best in the mean over the spheres. kPlain: the values of S
-// alone. S grows as 1 / Gn near grazing, a thousandfold for beta = 1 degree, and the first terms of
-// the plain matrix hold little else: all other directions go black. Where one of a pair's two terms
-// would be cut off, both are. The lattice in theta resolves the narrowest lobe (deviations from 0.7
-// degrees, half a deviation per step); between lattice points the matrix is interpolated linearly,
-// which widens a lobe: the peak of the narrowest is 2 % low. With all terms the matrix is not
-// decomposed. A second or two per fiber at R = 16. Tested in
-// tests/render/rivals/bcsdf_factors_test.cpp.
+// The matrix's symmetry does most of the work. S depends on azimuths through phi_o - phi_i only. On
+// a lattice equally spaced in azimuth, Fourier modes cos(m (phi_o - phi_i)) therefore split the
+// matrix into blocks over (theta_i, theta_o): m = 0 once, m > 0 twice, as cos cos and sin sin. The
+// singular values of the blocks are the matrix's. Mode 0 holds R and TT. Every other mode is the
+// block of TT times a number. So there are two decompositions per colour, whatever the number of
+// azimuths.
+//
+// The cut depends on the matrix that is decomposed. kWeighted takes S cos(theta_i) times the square
+// roots of the two solid angles; the cut is then the best in the mean over the spheres. kPlain
+// takes the values of S alone. S grows as 1 / Gn near grazing, a thousandfold for beta = 1 degree.
+// The first terms of the plain matrix hold little else, and all other directions go black. If one
+// of a pair's two terms would be cut off, both are.
+//
+// The lattice in theta resolves the narrowest lobe (deviations from 0.7 degrees, half a deviation
+// per step). Linear interpolation between lattice points widens a lobe: the peak of the narrowest
+// is 2 % low. With all terms the matrix is not decomposed. A second or two per fiber at R = 16.
+// Tested in tests/render/rivals/bcsdf_factors_test.cpp.
 
 #include <Eigen/Core>
 #include <array>

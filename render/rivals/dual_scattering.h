@@ -3,30 +3,33 @@
 // Dual scattering (Zinke, Yuksel, Weber and Keyser 2008) on explicit fibers, density factors 1 as
 // in Khungurn 2017. Light of irradiance 1 along w_d (inclination theta_d) leaves a fiber towards wo
 // as
-//   cos(theta_d) (S + f_back)                where no fiber lies between it and the light,
-//   cos(theta_d) T_f (S^G + f_back^G)        behind n >= 1 fibers:
-//   T_f       = product of a_f(theta_d^k) over the fibers k that the light passes, each with its
-//             own scattering
+//   cos(theta_d) (S + f_back)            if no fiber lies between it and the light
+//   cos(theta_d) T_f (S^G + f_back^G)    behind n >= 1 fibers
+//
+//   T_f       = product of a_f(theta_d^k) over the fibers k that the light passes, each with the
+//               scattering of its own
 //   sigma_f^2 = sum of beta_f^2(theta_d^k) over the same fibers
 //   S^G       : S under light spread by sigma_f^2 in inclination, evenly over the front half in
-//             azimuth: its M with
-//               variance beta^2 + sigma_f^2, its N averaged over that half
-//   f_back    = 2 A_b g(theta_o + theta_d, sigma_b^2) / (pi cos^2 theta), behind the fiber (|phi_o
-//             - phi_d| < pi / 2)
+//               azimuth: its M has variance beta^2 + sigma_f^2, its N is averaged over that half
+//   f_back    = 2 A_b g(theta_o + theta_d, sigma_b^2) / (pi cos^2 theta), behind the fiber
+//               (|phi_o - phi_d| < pi / 2), theta = (theta_o - theta_d) / 2
 //   f_back^G  : the same with sigma_b^2 + sigma_f^2, averaged over the front half of incoming
-//             azimuths
+//               azimuths
 //   A_b       = a_b a_f^2 / (1 - a_f^2) + a_b^3 a_f^2 / (1 - a_f^2)^3
-//   sigma_b   = (1 + a_f^2) (a_b sqrt(2 beta_f^2 + beta_b^2) + a_b^3 sqrt(2 beta_f^2 + 3 beta_b^2))
-//             /
-//               (a_b + a_b^3 (2 beta_f + 3 beta_b))
-// a_f and a_b: share of light that a fiber sends into its front (azimuth more than pi/2 from the
-// light's) and back half, averaged over incoming azimuths, in closed form here:  a_f = F / 2 + (1 -
-// F) C_TT P,  a_b = F / 2 + (1 - F) C_TT (1 - P), P the share of TT's azimuth within pi/2 of
-// straight on. beta_f^2, beta_b^2: the lobes' variances, weighed by those shares. theta = (theta_o
-// - theta_d) / 2 in cos^2; R and TT are not shifted, so the means of their shifts (Delta_b) are 0.
-// Everything per colour. Difference: the pseudo-code of the paper has one more factor pi before
-// f_back^G. f_back^G is already an average over incoming directions, so we leave it out; how much
-// it changes is in docs/rivals.md. Light from a fiber of one's own cannot be passed. Tested in
+//   sigma_b   = (1 + a_f^2)
+//               * (a_b sqrt(2 beta_f^2 + beta_b^2) + a_b^3 sqrt(2 beta_f^2 + 3 beta_b^2))
+//               / (a_b + a_b^3 (2 beta_f + 3 beta_b))
+//
+// a_f and a_b are the shares of light that a fiber sends into its front half (azimuth more than
+// pi/2 from the light's) and its back half, averaged over incoming azimuths. In closed form, with P
+// the share of TT's azimuth within pi/2 of straight on:
+//   a_f = F / 2 + (1 - F) C_TT P,   a_b = F / 2 + (1 - F) C_TT (1 - P)
+// beta_f^2 and beta_b^2 are the lobes' variances, weighed by those shares. R and TT are not
+// shifted, so the means of their shifts (Delta_b) are 0. Everything is per colour.
+//
+// Difference: the pseudo-code of the paper multiplies f_back^G by a further pi. f_back^G is already
+// an average over incoming directions, so we leave it out. docs/rivals.md says how much that
+// changes. A ray ignores the fiber that it starts at, so no fiber counts itself. Tested in
 // tests/render/rivals/dual_scattering_test.cpp.
 
 #include <array>

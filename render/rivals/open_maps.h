@@ -1,10 +1,10 @@
 #ifndef HEDDLE_RENDER_RIVALS_OPEN_MAPS_H_
 #define HEDDLE_RENDER_RIVALS_OPEN_MAPS_H_
-// Which directions are open from each segment, as the signs of the stored signed distances say, on
-// the cells of their lat-long map: from what the rivals make their own representations of
-// visibility, so that they differ from ours by nothing else. Directions below the horizon count as
-// closed where light comes from the face only. 26 us per segment at 128 x 128 cells: two matrix
-// products. Tested in tests/render/rivals/open_maps_test.cpp.
+// Which directions are open from each segment, by the signs of the stored signed distances, on the
+// cells of their lat-long map. The rivals make their own representations of visibility from it, so
+// that they differ from ours in nothing else. With light from the face only, directions below the
+// horizon count as closed. 26 us per segment at 128 x 128 cells: two matrix products. Tested in
+// tests/render/rivals/open_maps_test.cpp.
 
 #include <Eigen/Core>
 #include <vector>

@@ -1,7 +1,7 @@
 #ifndef HEDDLE_RENDER_RIVALS_PRT_SCATTERING_H_
 #define HEDDLE_RENDER_RIVALS_PRT_SCATTERING_H_
 // Single scattering by standard precomputed radiance transfer (Sloan et al. 2002), as Khungurn
-// 2017, section 6.2, compares it: light that reaches a segment directly goes through the same
+// 2017, section 6.2, compares it. Light that reaches a segment directly goes through the same
 // low-order harmonics as indirect light does.
 //
 //   c_light[j]  light in real spherical harmonics of order 5: Y_j(w), or A_l(sharpness) Y_lm(axis)
@@ -11,10 +11,10 @@
 //
 // A product of two harmonics of order 5 has order 10, so the matrix holds nothing of V beyond its
 // harmonics of order 10. Stored per segment is V cut to order 10 at the 231 nodes of a product rule
-// that is exact for V Y_k Y_j (0.9 KB instead of 5 KB): the sums over the nodes are the matrix's. V
-// comes from the signs of the stored signed distances. What is lost is what order 5 cannot hold:
-// highlights, and sharp shadows; what it makes up is ringing, of either sign. 0.1 ms per segment at
-// load. Tested in tests/render/rivals/prt_scattering_test.cpp.
+// that is exact for V Y_k Y_j: 0.9 KB instead of 5 KB. Sums over the nodes give the matrix. V comes
+// from the signs of the stored signed distances. Order 5 loses highlights and sharp shadows. It
+// adds ringing of either sign. 0.1 ms per segment at load. Tested in
+// tests/render/rivals/prt_scattering_test.cpp.
 
 #include <Eigen/Core>
 #include <span>

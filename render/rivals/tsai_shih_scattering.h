@@ -1,20 +1,20 @@
 #ifndef HEDDLE_RENDER_RIVALS_TSAI_SHIH_SCATTERING_H_
 #define HEDDLE_RENDER_RIVALS_TSAI_SHIH_SCATTERING_H_
-// Single scattering by the scheme of Tsai and Shih 2006 as Khungurn 2017, section 6.2, compares it:
-// the BCSDF factored by its singular value decomposition, visibility in spherical Gaussians, more
-// of them than ours.
+// Single scattering by the scheme of Tsai and Shih 2006, as Khungurn 2017, section 6.2, compares
+// it. The BCSDF is factored by its singular value decomposition. Visibility is in spherical
+// Gaussians, more of them than ours.
 //
-// Per segment V(w) = sum over q of share_q A_q G(w; xi_q, s) / M(s): 512 axes on the upper
-// hemisphere (1024 on the sphere), s = 320, share_q the open part of the axis' Voronoi cell and A_q
-// the cell's solid angle (Khungurn 2017, section 4.1), from the signs of the stored signed
-// distances; one byte per Gaussian. The transfer function of factor r is V g_r cos(theta_i); with
-// the light it integrates to
-//   spherical Gaussian: lobe by lobe, the product of lobe and light being a Gaussian again
-//     (BcsdfFactors::response);
-//   directional:        V(w) g_r(w) cos(theta_i).
-// Tsai and Shih fit Gaussians to V g_r itself; a lobe as wide as those would smear a specular g_r,
-// so g_r stays exact here, which favours the rival. The sum over r is folded into the cut matrix:
-// time does not depend on R. Everything in fabric space. Tested in
+// Per segment V(w) = sum over q of share_q A_q G(w; xi_q, s) / M(s), with one byte per Gaussian.
+// There are 512 axes on the upper hemisphere (1024 on the sphere), and s = 320. share_q is the open
+// part of the axis' Voronoi cell, by the signs of the stored signed distances. A_q is the cell's
+// solid angle (Khungurn 2017, section 4.1). The transfer function of factor r is V g_r
+// cos(theta_i). With the light it integrates to
+//   spherical Gaussian: lobe by lobe, as the product of lobe and light is a Gaussian again
+//                       (BcsdfFactors::response)
+//   directional:        V(w) g_r(w) cos(theta_i)
+// Tsai and Shih fit Gaussians to V g_r itself. Lobes that wide would smear a specular g_r, so g_r
+// stays exact here, which favours the rival. The sum over r is folded into the cut matrix, so time
+// does not depend on R. Everything is in fabric space. Tested in
 // tests/render/rivals/tsai_shih_scattering_test.cpp.
 
 #include <cstdint>

@@ -1,16 +1,17 @@
 #ifndef HEDDLE_RENDER_SURFACE_DISTANCE_MAPS_H_
 #define HEDDLE_RENDER_SURFACE_DISTANCE_MAPS_H_
-// What every vertex of a cloth sees of its surroundings, as signed distances: Iwasaki et al. 2014,
-// section 3.2. Positive where a direction is visible, the angle to the nearest direction of the
-// other kind, compressed over the vertices by principal components (the paper's 48).
+// What every vertex of a cloth sees of its surroundings, as signed distances (Iwasaki et al. 2014,
+// section 3.2). The distance is the angle to the nearest direction of the other kind, and positive
+// where a direction is visible. It is compressed over the vertices by principal components (48 in
+// the paper).
 //
-// Directions are in the patch frame of the vertex: x = thread 1, y = thread 2, z = the normal;
-// below the horizon all is hidden. One map serves all tangents of both threads: distance and
+// Directions are in the patch frame of the vertex: x = thread 1, y = thread 2, z = the normal.
+// Below the horizon all is hidden. One map serves all tangents of both threads: distance and
 // gradient are geodesic, on the sphere, and visibility_line() turns them into the theta and phi of
-// any thread frame. (The paper measures in theta and phi themselves, which would take a map per
-// tangent.) Maps are latitude-longitude about x, so theta and phi of a flat thread 1: their poles
-// lie at the ends of that thread, on the horizon, and the zenith is an ordinary point. Thread-safe
-// once built. Tested in tests/render/surface/distance_maps_test.cpp.
+// any thread frame. (The paper measures in theta and phi, which would take a map per tangent.) Maps
+// are latitude-longitude about x, which is theta and phi of a flat thread 1. Their poles lie at the
+// ends of that thread, on the horizon, and the zenith is an ordinary point. Thread-safe once built.
+// Tested in tests/render/surface/distance_maps_test.cpp.
 
 #include <filesystem>
 #include <functional>
@@ -85,10 +86,10 @@ class DistanceMaps {
   double compression_error_ = 0;
 };
 
-/// The distance at a direction as a line in the theta and phi of a thread frame whose angles there
-/// are `theta` and, with d direction / d theta and d direction / (cos theta d phi), the two unit
-/// vectors. Widths of Gaussians about the direction are measured from it. All is visible or hidden
-/// where there is no gradient.
+/// The distance at a direction as a line in the theta and phi of a thread frame. cos_theta is that
+/// of the direction there. The two unit vectors are d direction / d theta and d direction / (cos
+/// theta d phi). Widths of Gaussians about the direction are measured from it. Without a gradient
+/// all is visible or all is hidden.
 VisibilityLine visibility_line(const SignedDistance& at, double cos_theta, const Vec3d& along_theta,
                                const Vec3d& along_phi);
 VisibilityLine8 visibility_line(const SignedDistance8& at, Float8 cos_theta,

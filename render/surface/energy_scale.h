@@ -1,9 +1,10 @@
 #ifndef HEDDLE_RENDER_SURFACE_ENERGY_SCALE_H_
 #define HEDDLE_RENDER_SURFACE_ENERGY_SCALE_H_
-// A factor g(w) for the highlights of the woven models that keeps energy and reciprocity: with
-// highlights times g(wi) g(wo) no direction returns more than arrives from it, as g = min(1, room /
-// highlights' directional albedo) at either end is enough and both are at most 1. The albedo is
-// tabulated over directions. Tested in tests/render/surface/energy_scale_test.cpp.
+// A factor g(w) for the highlights of the woven models that keeps energy and reciprocity.
+// Highlights are multiplied by g(wi) g(wo), with g = min(1, room / highlights' directional albedo).
+// Both factors are at most 1, and either is enough, so no direction returns more than arrives from
+// it. The albedo is tabulated over directions. Tested in
+// tests/render/surface/energy_scale_test.cpp.
 
 #include <functional>
 #include <vector>

@@ -2,16 +2,16 @@
 #define HEDDLE_RENDER_SURFACE_MICROCYLINDER_H_
 // Cloth as threads in two directions: Sadeghi et al. 2013, "A practical microcylinder appearance
 // model for cloth rendering", section 5, for one directional light:
-//   R(wi, wo) = BRDF * (n . wi) = 1/Q sum_j a_j <f_s M P cos theta_i>_j,   Q = sum_j a_j <P>_j + (1
-//     - sum_j a_j) (wo . n)
-// with < >_j the mean over the tangent curve of thread j, M (eq. 7-9) shadowing and masking, P (eq.
-// 11-13) the projected lengths. Q depends on wi, so 1/Q stands inside the integral over light (eq.
-// 14 prints it outside). R = 0 where Q = 0; tangents with M P = 0 are left out before the division
-// by cos^2 theta_d.
+//   R(wi, wo) = BRDF * (n . wi) = 1/Q sum_j a_j <f_s M P cos theta_i>_j
+//   Q = sum_j a_j <P>_j + (1 - sum_j a_j) (wo . n)
+// < >_j is the mean over the tangent curve of thread j. M (eq. 7-9) is shadowing and masking, P
+// (eq. 11-13) the projected lengths. Q depends on wi, so 1/Q stands inside the integral over light
+// (eq. 14 prints it outside). R = 0 where Q = 0. Tangents with M P = 0 are left out before the
+// division by cos^2 theta_d.
 //
-// Means over tangent curves are integrals over the tangent's angle (tangent_curve.h), in panels
-// that end where M or P change form and that resolve the lobes: relative error below 1e-6 against
-// 16 times as many panels, 1e-5 beyond 89 degrees. A few equally spaced samples instead show
+// Means over tangent curves are integrals over the tangent's angle (tangent_curve.h). Their panels
+// end where M or P change form, and resolve the lobes. The relative error is below 1e-6 against 16
+// times as many panels, 1e-5 beyond 89 degrees. A few equally spaced samples instead show
 // highlights that are not there. Everything is double; eval asks the same functions.
 //
 // The published model is neither reciprocal nor energy conserving, and unbounded for opposite
@@ -58,8 +58,8 @@ class Microcylinder final : public SurfaceModel {
   Rgbd reflected_sg(const SurfacePoint& point, const Vec3d& axis, double sharpness,
                     const Vec3d& wo) const override;
 
-  /// A mixture of lobes about the mirror cones of tangents of the curves, chosen by what each shows
-  /// to wo, and of uniform directions over the hemisphere.
+  /// A mixture of uniform directions over the hemisphere and of lobes about the mirror cones of
+  /// tangents of the curves. Lobes are chosen by their contribution towards wo.
   std::optional<SurfaceSample> sample(const SurfacePoint& point, const Vec3& wo,
                                       RandomStream& random) const override;
   float pdf(const SurfacePoint& point, const Vec3& wi, const Vec3& wo) const override;

@@ -2,12 +2,12 @@
 #define HEDDLE_RENDER_SURFACE_SG_LIGHT_QUADRATURE_H_
 // A surface model under a spherical Gaussian light by quadrature, for models without a closed form.
 //
-// Fibonacci lattices in (share of the light's power within an angle of its axis, azimuth): there
-// the light is constant, for every sharpness from 0 (the whole sphere) up. Each next lattice
-// has 2.6 times as many points, until two agree. Errors fall as 1 / N for continuous models and as
-// N^(-3/4) for those with steps (point values of woven cloth). Adaptive cells were tried: they miss
-// steps that touch a cell between its nodes, and at equal cost their errors were larger. Tested in
-// tests/render/surface/sg_light_quadrature_test.cpp.
+// It uses Fibonacci lattices in (share of the light's power within an angle of its axis, azimuth).
+// The light is constant in these coordinates, for every sharpness from 0 (the whole sphere) up.
+// Each next lattice has 2.6 times as many points, until two agree. Errors fall as 1 / N for
+// continuous models and as N^(-3/4) for those with steps (point values of woven cloth). Adaptive
+// cells were tried. They miss steps that touch a cell between its nodes, and at equal cost their
+// errors were larger. Tested in tests/render/surface/sg_light_quadrature_test.cpp.
 
 #include <functional>
 

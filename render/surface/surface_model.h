@@ -1,10 +1,10 @@
 #ifndef HEDDLE_RENDER_SURFACE_SURFACE_MODEL_H_
 #define HEDDLE_RENDER_SURFACE_SURFACE_MODEL_H_
 // A cloth seen as a surface: what one point of it reflects, without any fibers. The models are in
-// the files beside this one; a fabric config says which by its key `model`.
+// the files beside this one. A fabric config names its model by the key `model`.
 //
 // Patch frame: x = thread 1 (weft), y = thread 2 (warp), z = the normal of the side that is looked
-// at; directions are unit vectors that point away from the surface. Light reaches and leaves the
+// at. Directions are unit vectors that point away from the surface. Light reaches and leaves the
 // upper side only: all functions are 0 unless wi.z > 0 and wo.z > 0. Evaluation is thread-safe.
 // Tested in tests/render/surface/.
 

@@ -1,7 +1,7 @@
 #ifndef HEDDLE_RENDER_SURFACE_SURFACE_PRESETS_H_
 #define HEDDLE_RENDER_SURFACE_SURFACE_PRESETS_H_
-// The surface fabrics that Heddle knows by name: the files configs/fabrics/NAME.toml that have a
-// key `model`, built into the program so that a name works wherever it runs. Tested in
+// The surface fabrics that Heddle knows by name. They are the files configs/fabrics/NAME.toml with
+// a key `model`, built into the program, so that a name works wherever it runs. Tested in
 // tests/render/surface/surface_presets_test.cpp.
 
 #include <string>

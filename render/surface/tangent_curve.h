@@ -4,11 +4,12 @@
 // section 5.1 and table II.
 //
 // A curve is given by control points: the tangent's angle from the cloth at each, and the arc
-// length between neighbours. The angle is linear in arc length in between; a segment of no length
+// length between neighbours. The angle is linear in arc length in between. A segment of no length
 // is a jump. Sums over equally spaced samples of a curve converge to an integral over the
-// distribution of the angle alone, whatever the order along the curve: constant density on each
-// ramp, an atom for each flat segment. That distribution is what is computed here; a few samples in
-// its place give wrong highlights. Tested in tests/render/surface/tangent_curve_test.cpp.
+// distribution of the angle alone, whatever the order along the curve. The distribution has
+// constant density on each ramp and an atom for each flat segment. It is computed here; a few
+// samples in its place give wrong highlights. Tested in
+// tests/render/surface/tangent_curve_test.cpp.
 
 #include <vector>
 

@@ -3,21 +3,20 @@
 // Scattering of one thread: Sadeghi et al. 2013, "A practical microcylinder appearance model for
 // cloth rendering", equations 2 to 4, with the angles of its figure 9.
 //
-// Thread frame: tangent t, local normal n, binormal b = n x t; directions point away from the
+// Thread frame: tangent t, local normal n, binormal b = n x t. Directions point away from the
 // thread.
-//   theta = asin(w.t), phi = atan2(w.b, w.n), theta_h, theta_d = (theta_i +- theta_r) / 2, phi_d =
-//     phi_i - phi_r
-//   f_s = (Fr cos(phi_d/2) g(gamma_s, theta_h) + A F ((1 - kd) g(gamma_v, theta_h) + kd) / (cos
-//     theta_i + cos theta_r))
-//         / cos^2 theta_d
-// with g a Gaussian of unit area over radians and Fr the exact unpolarised reflectance at the angle
-// whose cosine is cos theta_d cos(phi_d/2). What the text leaves open is named in
-// ThreadConventions. f_s is reciprocal to the last bit; it is not bounded (1/cos^2 theta_d) and not
-// energy conserving: docs/surface-models.md.
+//   theta = asin(w.t), phi = atan2(w.b, w.n)
+//   theta_h, theta_d = (theta_i +- theta_r) / 2, phi_d = phi_i - phi_r
+//   f_s = (Fr cos(phi_d/2) g(gamma_s, theta_h)
+//          + A F ((1 - kd) g(gamma_v, theta_h) + kd) / (cos theta_i + cos theta_r)) / cos^2 theta_d
+// g is a Gaussian of unit area over radians. Fr is the exact unpolarised reflectance at the angle
+// whose cosine is cos theta_d cos(phi_d/2). ThreadConventions names what the text leaves open. f_s
+// is reciprocal to the last bit. It is not bounded (1/cos^2 theta_d) and not energy conserving:
+// docs/surface-models.md.
 //
-// No angle is ever subtracted: with v = (cos, sin) of two angles, |v_i + v_r| / 2 and |v_i - v_r| /
-// 2 are the cosine and the sine of half their difference, which wraps phi_d to [-pi, pi] and does
-// not cancel. N directions are computed at once, in double; the arctangent is exact to 5e-14.
+// No angle is ever subtracted. With v = (cos, sin) of two angles, |v_i + v_r| / 2 and |v_i - v_r| /
+// 2 are the cosine and the sine of half their difference. That wraps phi_d to [-pi, pi] and does
+// not cancel. N directions are computed at once, in double. The arctangent is exact to 5e-14.
 // Tested in tests/render/surface/thread_scattering_test.cpp.
 
 #include <cmath>

@@ -2,16 +2,18 @@
 #define HEDDLE_RENDER_SURFACE_WEIGHTING_TABLE_H_
 // Shadowing, masking and projection of the threads of a patch, averaged over spherical Gaussians
 // and tabulated: T of Iwasaki et al. 2014, eq. 10,
-//   T_t(axis, sharpness, wo) = integral over the upper hemisphere of G W_t / integral over it of G,
-// W_t of a tangent t = M P / Q with Q of Sadeghi et al. 2013 (eq. 15), times the tangent's share of
-// the patch: then shading a constant light without further factors gives the model of
-// render/surface/microcylinder.h for those tangents. As printed (eq. 7) W_t = M P / (sum of P over
-// all tangents) instead, times the thread's share alone: threads then weigh by their numbers of
-// samples, gaps do not count, and two equal threads of one half give half of Sadeghi's model.
+//   T_t(axis, sharpness, wo) = integral over the upper hemisphere of G W_t / integral over it of G
+// W_t of a tangent t is M P / Q, with Q of Sadeghi et al. 2013 (eq. 15), times the tangent's share
+// of the patch. Shading a constant light without further factors then gives the model of
+// render/surface/microcylinder.h for those tangents.
+//
+// As printed (eq. 7) W_t = M P / (sum of P over all tangents), times the thread's share alone.
+// Threads then weigh by their numbers of samples, gaps do not count, and two equal threads of one
+// half give half of Sadeghi's model.
 //
 // W depends on tangent curves, shares and the blend width only, so scattering parameters can change
 // under it. Per tangent the tables of all sharpnesses are stacked and factored by one singular
-// value decomposition, T = U V^T: V belongs to wo, U to the light. Directions x = thread 1, y =
+// value decomposition, T = U V^T. V belongs to wo, U to the light. Directions x = thread 1, y =
 // thread 2, z = normal. Thread-safe once built. Tested in
 // tests/render/surface/weighting_table_test.cpp; sizes and errors: docs/surface-models.md.
 
@@ -42,11 +44,10 @@ struct TangentSample {
   Mat3d frame() const;
 };
 
-/// Samples at the middles of equal parts of every ramp of the tangent curves, one for every flat
-/// segment. Parts are at most that one of 4.5, 9, 18, ... degrees which is nearest to 1.5 times the
-/// deviation of the thread's surface lobe, so that all deviations from 4.2 to 8.5 degrees, or 8.5
-/// to 17, ..., have the same samples; but no thread has more than `most` of them and one for each
-/// piece.
+/// Samples at the middles of equal parts of every ramp of the tangent curves, and one for every
+/// flat segment. The largest part is 4.5, 9, 18, ... degrees, whichever is nearest to 1.5 times the
+/// deviation of the thread's surface lobe. So all deviations from 4.2 to 8.5 degrees, or 8.5 to 17,
+/// ..., have the same samples. No thread has more than `most` of them and one for each piece.
 std::vector<TangentSample> tangent_samples(const MicrocylinderFabric& fabric, int most);
 
 enum class Weighting : std::uint8_t { kConsistent, kPrinted };

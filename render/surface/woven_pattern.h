@@ -1,12 +1,11 @@
 #ifndef HEDDLE_RENDER_SURFACE_WOVEN_PATTERN_H_
 #define HEDDLE_RENDER_SURFACE_WOVEN_PATTERN_H_
-// The face of a woven cloth as rectangles: where the warp lies on top, the crossings that follow
-// each other along an end make one visible segment, and so do those along a pick where the weft
-// lies on top.
+// The face of a woven cloth as rectangles. Crossings that follow each other along an end with the
+// warp on top make one visible segment. So do those along a pick with the weft on top.
 //
-// x along the weft (across the ends), y along the warp (across the picks), the repeat is [0, width)
-// x [0, height), periodic. Ends and picks have widths of their own, so the segments need not be
-// square. Lengths in the units of the config. Tested in
+// x runs along the weft (across the ends), y along the warp (across the picks). The repeat is [0,
+// width) x [0, height), periodic. Ends and picks have widths of their own, so the segments need not
+// be square. Lengths are in the units of the config. Tested in
 // tests/render/surface/woven_pattern_test.cpp.
 
 #include <cstdint>
@@ -76,9 +75,9 @@ class WovenPattern {
              const std::function<void(const PlacedFloat&, const Rectangle&)>& visitor) const;
 
   /// What a footprint sees: the axis-parallel square about the position whose side is the
-  /// footprint. Below kPointFootprint it is a point; from one to two repeats (the longer side of
-  /// the repeat) it blends into the cloth as a whole, which it is from there on. So at every
-  /// footprint the mean over a repeat of what is seen is the cloth.
+  /// footprint. Below kPointFootprint it is a point. From one to two repeats (the longer side of
+  /// the repeat) it blends into the cloth as a whole, and from there on it is the whole. So at
+  /// every footprint the mean over a repeat of what is seen is the cloth.
   void visit_footprint(const Vec2d& position, double footprint,
                        const std::function<void(const FootprintPart&)>& visitor) const;
 

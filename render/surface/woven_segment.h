@@ -5,9 +5,9 @@
 //
 // Frame of a segment, for warp and weft alike: origin at the window's lower left corner, x along
 // the weft, y along the warp. `half` is the xy part of the unit half vector. Lengths are in any one
-// unit. Irawan and Marschner 2006, equations 2-10. The area is not found by the paper's five cases,
-// which need an ellipse that fits the window, but edge by edge, for any ellipse and any rectangle;
-// where the ellipse fits, both agree to rounding. Tested in
+// unit. Irawan and Marschner 2006, equations 2-10. The paper finds the area by five cases, which
+// need an ellipse that fits the window. Here it is found edge by edge, for any ellipse and any
+// rectangle. If the ellipse fits, both agree to rounding. Tested in
 // tests/render/surface/woven_segment_test.cpp, where the five cases are the oracle.
 
 #include "fibers/math/vector.h"
@@ -53,7 +53,7 @@ double highlight_area(const WovenSegment& segment, const Vec2d& half, const Rect
 double highlight_share(const WovenSegment& segment, const Vec2d& half);
 
 /// Two directions of the upper side whose sum is shorter than this look along the cloth from
-/// opposite sides; there the models reflect nothing and are not sampled by half vectors, so that
+/// opposite sides. There the models reflect nothing and are not sampled by half vectors, so that
 /// nothing overflows.
 inline constexpr double kShortestSum = 1e-30;
 
