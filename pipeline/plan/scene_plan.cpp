@@ -11,7 +11,6 @@
 #include "pipeline/plan/enclosure.h"
 #include "pipeline/plan/measure_accuracy.h"
 #include "pipeline/plan/probe.h"
-#include "pipeline/scene_needs.h"
 
 namespace heddle {
 namespace {
