@@ -124,8 +124,7 @@ int render_command(const RenderOptions& options, const CommonOptions& common) {
     require_writable(std::filesystem::path(options.output).replace_extension(extension));
   }
   if (options.tolerance) return render_within(*options.tolerance, options, job);
-  SceneJob scene(options.scene, job.context(),
-                 {.order = options.order, .fabric = {}, .blend = {}, .surface_method = {}});
+  SceneJob scene(options.scene, job.context(), variant_of_order(options.scene, options.order));
   PictureRequest request = scene.request(find_view(scene.config(), options.view));
   apply_overrides(options, request);
   write_picture(scene.render(request, "render"), options.output, job);

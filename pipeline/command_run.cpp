@@ -76,8 +76,7 @@ Image cropped(const Image& full, const PixelRect& crop) {
 
 int run_command(const RunOptions& options, const CommonOptions& common) {
   Job job(common);
-  SceneJob scene(options.scene, job.context(),
-                 {.order = options.order, .fabric = {}, .blend = {}, .surface_method = {}});
+  SceneJob scene(options.scene, job.context(), variant_of_order(options.scene, options.order));
   const fs::path folder =
       options.output.empty() ? fs::path("out") / options.scene.stem() : options.output;
   make_folder(folder);

@@ -10,7 +10,6 @@
 #include "formats/content_hash.h"
 #include "formats/input_error.h"
 #include "pipeline/interrupt.h"
-#include "pipeline/scene_needs.h"
 #include "pipeline/version.h"
 #include "pipeline/warnings.h"
 #include "render/cloth_scene.h"
@@ -56,34 +55,33 @@ PathTracerSettings path_tracer_settings(const PictureRequest& request) {
   settings.seed = request.seed;
   settings.local = request.local;
   settings.estimator = request.estimator;
-  if (request.method == RenderMethod::kPath6) settings.limits.max_scatterings = 6;
+  if (const std::optional<int> most = method_row(request.method).max_scatterings)
+    settings.limits.max_scatterings = *most;
   if (request.bounces) settings.limits.max_scatterings = *request.bounces;
   return settings;
 }
 
-LocalShading shading_of(RenderMethod method) {
-  switch (method) {
-    case RenderMethod::kPrinted:
-      return LocalShading::kPrinted;
-    case RenderMethod::kPrt:
-      return LocalShading::kPrt;
-    case RenderMethod::kTsaiShih16:
-      return LocalShading::kTsaiShih16;
-    case RenderMethod::kTsaiShihFull:
-      return LocalShading::kTsaiShihFull;
-    case RenderMethod::kDualScattering:
-      return LocalShading::kDualScattering;
-    default:
-      return LocalShading::kShipped;
+}  // namespace
+
+SceneVariant variant_of_fabrics(const SceneConfig& scene, const SceneVariant::OfFabric& of_each) {
+  SceneVariant variant;
+  if (of_each == SceneVariant::OfFabric{}) return variant;
+  for (const ClothConfig& cloth : scene.cloths) {
+    if (!cloth.surface) variant.fabrics[cloth.fabric] = of_each;
   }
+  return variant;
 }
 
-}  // namespace
+SceneVariant variant_of_order(const fs::path& scene_file, std::optional<int> order) {
+  if (!order) return {};
+  return variant_of_fabrics(read_scene_config(TomlTable::load(scene_file)), {.order = order});
+}
 
 /// Packs and geometry of a scene for one method.
 struct SceneJob::Loaded {
   std::map<fs::path, FabricPack> packs;  // by fabric file
   std::map<fs::path, std::shared_ptr<const TileScene>> tiles;
+  std::vector<const FabricPack*> cloth_packs;  // [cloth of fibers]
   std::unique_ptr<ClothScene> scene;
   std::vector<BcsdfTable> materials;                                   // of the scene
   std::vector<Warning> warnings;                                       // of the packs
@@ -137,7 +135,7 @@ PictureRequest SceneJob::reference_request(const ViewConfig& view) const {
 }
 
 VisibilityBlend SceneJob::blend_for(RenderMethod method) const {
-  return method == RenderMethod::kPrinted ? kPrintedBlend : variant_.blend;
+  return method_row(method).as_printed ? kPrintedBlend : variant_.blend;
 }
 
 Needs SceneJob::needs_for(RenderMethod method, const fs::path& fabric) const {
@@ -149,8 +147,7 @@ Needs SceneJob::needs_for(RenderMethod method, const fs::path& fabric) const {
 std::vector<StageCost> SceneJob::precompute_costs(const PictureRequest& request) {
   packs_for(request.method);
   std::vector<StageCost> all;
-  for (auto& [file, stages] :
-       request.method == RenderMethod::kPrinted ? printed_fabrics() : fabrics_) {
+  for (auto& [file, stages] : fabrics_for(request.method)) {
     for (StageCost& cost : stages->costs(needs_for(request.method, file)))
       all.push_back(std::move(cost));
   }
@@ -163,13 +160,14 @@ std::vector<StageCost> SceneJob::precompute_costs(const PictureRequest& request)
 
 std::vector<Artifact> SceneJob::packs_for(RenderMethod method) {
   std::vector<Artifact> packs;
-  for (auto& [file, stages] : method == RenderMethod::kPrinted ? printed_fabrics() : fabrics_) {
+  for (auto& [file, stages] : fabrics_for(method)) {
     packs.push_back(stages->pack(needs_for(method, file)));
   }
   return packs;
 }
 
-SceneJob::Fabrics& SceneJob::printed_fabrics() {
+SceneJob::Fabrics& SceneJob::fabrics_for(RenderMethod method) {
+  if (!method_row(method).as_printed) return fabrics_;
   if (printed_fabrics_.empty()) {
     for (const auto& [file, stages] : fabrics_) {
       printed_fabrics_[file] = std::make_unique<FabricStages>(
@@ -231,11 +229,13 @@ const SceneJob::Loaded& SceneJob::loaded_for(RenderMethod method) {
   std::vector<std::shared_ptr<const TileScene>> tiles;
   for (const ClothConfig& cloth : config_.cloths) {
     if (cloth.surface) continue;
+    const FabricPack& pack = loaded->packs.at(cloth.fabric);
+    loaded->cloth_packs.push_back(&pack);
     // In the order of ClothScene::materials: of each tile once.
     const std::shared_ptr<const TileScene>& tile = loaded->tiles.at(cloth.fabric);
     if (std::find(tiles.begin(), tiles.end(), tile) == tiles.end()) {
-      const std::vector<BcsdfTable>& own = loaded->packs.at(cloth.fabric).materials;
-      loaded->materials.insert(loaded->materials.end(), own.begin(), own.end());
+      loaded->materials.insert(loaded->materials.end(), pack.materials.begin(),
+                               pack.materials.end());
     }
     tiles.push_back(tile);
   }
@@ -273,18 +273,14 @@ std::unique_ptr<SceneJob::Shading> SceneJob::shading_for(const PictureRequest& r
                             path_tracer_settings(request));
     return shading;
   }
-  std::vector<const FabricPack*> packs;
-  for (const ClothConfig& cloth : config_.cloths) {
-    if (!cloth.surface) packs.push_back(&loaded.packs.at(cloth.fabric));
-  }
   const PrecomputedSettings settings{.seed = request.seed,
-                                     .shading = shading_of(request.method),
-                                     .volume = request.method == RenderMethod::kVolume,
+                                     .method = request.method,
                                      .shadow_sigma_mm = config_.shadow_sigma_mm,
                                      .blend = blend_for(request.method),
                                      .transfer_order = transfer_order,
                                      .interactive = loaded.interactive};
-  shading->renderer.emplace(*loaded.scene, packs, config_.lights, config_.background, settings);
+  shading->renderer.emplace(*loaded.scene, loaded.cloth_packs, config_.lights, config_.background,
+                            settings);
   return shading;
 }
 
@@ -324,15 +320,9 @@ PictureResult SceneJob::render(const PictureRequest& request, const std::string&
   const Loaded& loaded = loaded_for(request.method);
   const Camera camera(request.camera);
 
-  PictureSetup setup{
-      loaded.scene.get(),       {}, config_.lights, &camera, request.crop, request.method,
-      blend_for(request.method)};
+  PictureSetup setup{loaded.scene.get(), loaded.cloth_packs, config_.lights,           &camera,
+                     request.crop,       request.method,     blend_for(request.method)};
   setup.interactive_surfaces = !traces_paths(request.method) && !surface_stages().keys().empty();
-  std::vector<const FabricPack*> packs;
-  for (const ClothConfig& cloth : config_.cloths) {
-    if (!cloth.surface) packs.push_back(&loaded.packs.at(cloth.fabric));
-  }
-  setup.packs = packs;
   std::vector<Warning> warnings = loaded.warnings;
   const auto add_warnings = [&](std::vector<Warning>&& more) {
     for (Warning& warning : more) warnings.push_back(std::move(warning));

@@ -19,25 +19,26 @@
 #include "pipeline/stages.h"
 #include "pipeline/surface_stages.h"
 #include "render/cloth_scene.h"
+#include "render/methods.h"
 #include "render/path_tracer.h"
 #include "render/scene_config.h"
 #include "render/single_scattering.h"
 
 namespace heddle {
 
-/// How the precomputed data of a scene's pictures differ from what its files say.
+/// How a scene's pictures differ from what its files say.
 struct SceneVariant {
-  std::optional<int> order;  // of the transfer; the fabric's where empty
-  FabricVariant fabric;
-  VisibilityBlend blend;
+  VisibilityBlend blend = {};
   // of all cloths that have a choice; the scene's where empty
-  std::optional<SurfaceMethod> surface_method;
-  /// Of one fabric (its file as the scene's config has it), in place of `order` and `fabric`.
+  std::optional<SurfaceMethod> surface_method = {};
+  /// Of the precomputed data of one fabric.
   struct OfFabric {
-    std::optional<int> order;
-    FabricVariant variant;
+    std::optional<int> order = {};  // of the transfer; the fabric's where empty
+    FabricVariant variant = {};
     auto operator<=>(const OfFabric&) const = default;
   };
+  // by the fabric's file as the scene's config has it; a fabric without an entry is as its file
+  // says
   std::map<std::filesystem::path, OfFabric> fabrics = {};
   // cloths (places in SceneConfig::cloths) drawn by their far_surface
   std::set<std::size_t> stand_ins = {};
@@ -45,9 +46,14 @@ struct SceneVariant {
 
   OfFabric of(const std::filesystem::path& file) const {
     const auto found = fabrics.find(file);
-    return found != fabrics.end() ? found->second : OfFabric{order, fabric};
+    return found != fabrics.end() ? found->second : OfFabric{};
   }
 };
+
+/// The same for every fabric of a scene.
+SceneVariant variant_of_fabrics(const SceneConfig& scene, const SceneVariant::OfFabric& of_each);
+/// The scene of a file with this order of the transfer for every fabric; as it is where empty.
+SceneVariant variant_of_order(const std::filesystem::path& scene_file, std::optional<int> order);
 
 /// One picture of a scene.
 struct PictureRequest {
@@ -115,7 +121,8 @@ class SceneJob {
   std::unique_ptr<Shading> shading_for(const PictureRequest& request,
                                        std::optional<int> transfer_order = {});
   using Fabrics = std::map<std::filesystem::path, std::unique_ptr<FabricStages>>;
-  Fabrics& printed_fabrics();
+  /// With the data that the method takes: ours, or baked as printed.
+  Fabrics& fabrics_for(RenderMethod method);
   std::vector<Artifact> packs_for(RenderMethod method);
   const Loaded& loaded_for(RenderMethod method);
   const SurfaceStages& surface_stages();

@@ -662,39 +662,35 @@ Artifact FabricStages::accuracy(const SurfaceFabric* surface) {
 
 AccuracyTable FabricStages::measure_accuracy_table() {
   AccuracyData data;
-  std::map<std::string, WorkTime> costs;
-  const auto note_costs = [&costs](FabricStages& stages, const std::string& suffix) {
+  std::map<CostKey, WorkTime> costs;
+  // What is built with one setting changed; the other stages have their own costs.
+  const auto note_cost_of = [&costs](FabricStages& stages, const char* stage,
+                                     const std::string& setting) {
     for (const StageCost& cost : stages.costs(kEverything)) {
-      if (cost.seconds >= 0)
-        costs.try_emplace(cost.stage + suffix, WorkTime{cost.seconds, cost.core_seconds});
+      if (cost.stage == stage && cost.seconds >= 0)
+        costs[{stage, setting}] = {cost.seconds, cost.core_seconds};
     }
   };
   data.pack = load_pack(pack(kEverything).path);
-  note_costs(*this, "");
+  for (const StageCost& cost : this->costs(kEverything)) {
+    if (cost.seconds >= 0) costs[{cost.stage}] = {cost.seconds, cost.core_seconds};
+  }
   for (const double factor : kOtherCells) {
     FabricStages other(document_.file, *context_, {.cell_size = factor});
     data.cells.emplace(factor, read_transfer(other.transfer({}).path));
-    note_costs(other, ", " + cells_setting(factor));
+    note_cost_of(other, "transfer", cells_setting(factor));
   }
   for (const double factor : kOtherVoxels) {
     FabricStages other(document_.file, *context_, {.voxel_rate = factor});
     data.voxels.emplace(factor, read_id_volume(other.volume().path));
-    note_costs(other, ", " + voxels_setting(factor));
+    note_cost_of(other, "voxelize", voxels_setting(factor));
   }
-  // Of the variants, only what differs counts.
-  std::erase_if(costs, [](const auto& entry) {
-    const std::string& name = entry.first;
-    const std::size_t comma = name.find(", ");
-    if (comma == std::string::npos) return false;
-    return !name.starts_with(name.substr(comma + 2).starts_with("cells") ? "transfer" : "voxelize");
-  });
-  if (costs.contains("transfer")) {
+  if (const auto whole = costs.find({"transfer"}); whole != costs.end()) {
     for (const int order : kOtherOrders) {
       if (order >= data.pack.transfer->order) continue;
       const double ratio = transfer_order_ratio(order);
-      const WorkTime& whole = costs.at("transfer");
-      costs["transfer, " + order_setting(order)] = {ratio * whole.seconds,
-                                                    ratio * whole.core_seconds};
+      costs[{"transfer", order_setting(order)}] = {ratio * whole->second.seconds,
+                                                   ratio * whole->second.core_seconds};
     }
   }
   Progress progress(*context_->console, "accuracy", "%", 100);

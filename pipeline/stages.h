@@ -42,18 +42,10 @@
 #include "precompute/transfer_bake.h"
 #include "precompute/visibility_settings.h"
 #include "precompute/voxelize.h"
+#include "render/methods.h"
 #include "render/scene_config.h"
 
 namespace heddle {
-
-/// What a render asks of a pack; the fibers are always there.
-struct Needs {
-  bool ssdf = false;
-  bool sgs = false;
-  bool transfer = false;
-  bool volume = false;
-  std::optional<int> order;  // of the transfer; the fabric's where empty
-};
 
 inline constexpr Needs kEverything{
     .ssdf = true, .sgs = true, .transfer = true, .volume = true, .order = {}};

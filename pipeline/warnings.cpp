@@ -156,11 +156,6 @@ Probe probe_of(const PictureSetup& setup) {
   return probe;
 }
 
-bool takes_visibility_forms(RenderMethod method) {
-  return method == RenderMethod::kExact || method == RenderMethod::kVolume ||
-         method == RenderMethod::kPrinted;
-}
-
 void add_light_warnings(const PictureSetup& setup, std::vector<Warning>& warnings) {
   const SgVisibility* sphere = nullptr;  // of the first fabric with light from both sides
   for (const FabricPack* pack : setup.packs) {
@@ -178,7 +173,8 @@ void add_light_warnings(const PictureSetup& setup, std::vector<Warning>& warning
            light.sharpness < 3 ? 0.4 : 0.13,
            "surface_method = \"sampled\", or several sharper lights in its place"});
     }
-    if (light.type != LightType::kSphericalGaussian || !takes_visibility_forms(setup.method))
+    if (light.type != LightType::kSphericalGaussian ||
+        method_row(setup.method).visibility != VisibilityData::kByLight)
       continue;
     const double sharpness = light.sharpness;
     const std::string name =
@@ -200,7 +196,7 @@ void add_light_warnings(const PictureSetup& setup, std::vector<Warning>& warning
                name, kDistanceSharpness),
            0.4, "Let sums of Gaussians serve it (visibility blend 10 to 20)"});
     }
-    if (setup.method == RenderMethod::kPrinted && sharpness < kPrintedGammaSharpness) {
+    if (method_row(setup.method).as_printed && sharpness < kPrintedGammaSharpness) {
       warnings.push_back({"gamma",
                           fmt::format("{}; Gamma as printed is off at grazing views below {:g}",
                                       name, kPrintedGammaSharpness),

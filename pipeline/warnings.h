@@ -18,6 +18,7 @@
 #include "render/camera.h"
 #include "render/cloth_scene.h"
 #include "render/lights.h"
+#include "render/methods.h"
 #include "render/render_output.h"
 #include "render/scene_config.h"
 #include "render/single_scattering.h"

@@ -1,27 +1,22 @@
 #ifndef HEDDLE_RENDER_PRECOMPUTED_RENDERER_H_
 #define HEDDLE_RENDER_PRECOMPUTED_RENDERER_H_
-// The fast methods: a deferred pass that shades what eye rays see from precomputed data (Khungurn
-// 2017, section 5). Per block of pixels and samples:
-//   1. G-buffer: cloth, segment, cell, frames and fabric position of every sample, by rays against
-//      the fibers or through the id volume;
-//   2. light visibility: a shadow ray against the shells and the meshes from the shell's surface
-//      straight above the hit (below it where the light is under the cloth), for single scattering;
-//      another from a point moved along the cloth by a 2D Gaussian, whose mean is the smoothed
-//      visibility of multiple scattering. For a spherical Gaussian the ray goes in a direction
-//      drawn from the light (the mean is a soft shadow); where the fabric takes light from its face
-//      only, from that part of the light that lies on the face's side, since the precomputed data
-//      hold no other light;
-//   3. shading, sorted by cell and tetrahedron: single_scattering.h, multiple_scattering.h, or a
-//      rival of theirs. Incoming fields of all lights are summed before they are turned and
-//      scattered, and are kept while cell and light direction stay the same.
-// Surface cloths are lit directly, at once, with shadows of the same shells and meshes: by one
-// sample (surface_cloth.h), or from data of their own without noise (interactive_surface.h). What
-// is not modelled: light between different parts of the cloth, and the shell's bend between two
-// fibers of one cell. Signs of multiple scattering are kept (see multiple_scattering.h): a dark
-// pixel can be slightly negative. Eye rays are those of the path tracer with the same seed. Random
-// numbers are addressed by pixel of the full frame and sample, and sums run in sample order: the
-// picture depends neither on threads nor on the crop. Tested in
-// tests/render/precomputed_renderer_test.cpp.
+// The fast methods: deferred shading of what eye rays see, from precomputed data (Khungurn 2017,
+// section 5). Three passes over blocks of pixels and samples:
+//   1. g_buffer.h: cloth, segment, cell, frames and fabric position of every sample. In: scene,
+//      fibers or id volumes, camera.
+//   2. light_visibility.h: shadow rays past all macroscopic things. In: G-buffer, scene, lights.
+//   3. fabric_shading.h, sorted by cloth, cell and tetrahedron. In: G-buffer, visibility, lights,
+//      the fabrics' data.
+// Whoever keeps a G-buffer relights it by passes 2 and 3; where the lights change their brightness
+// only, by pass 3.
+//
+// Surface cloths are lit directly in pass 3, with shadows of the same shells and meshes: by one
+// sample (surface_cloth.h), whose shadow rays depend on the model too, or from data of their own
+// without noise (interactive_surface.h). What is not modelled: light between different parts of the
+// cloth, and the shell's bend between two fibers of one cell. Signs of multiple scattering are kept
+// (see multiple_scattering.h): a dark pixel can be slightly negative. Random numbers are addressed
+// by pixel of the full frame and sample, and sums run in sample order: the picture depends neither
+// on threads nor on the crop. Tested in tests/render/precomputed_renderer_test.cpp.
 
 #include <cstdint>
 #include <memory>
@@ -30,35 +25,24 @@
 #include <vector>
 
 #include "fibers/baked/fabric_pack.h"
-#include "fibers/baked/id_bricks.h"
 #include "render/camera.h"
 #include "render/cloth_scene.h"
+#include "render/fabric_shading.h"
+#include "render/g_buffer.h"
 #include "render/interactive_surface.h"
+#include "render/light_visibility.h"
 #include "render/lights.h"
-#include "render/multiple_scattering.h"
+#include "render/methods.h"
 #include "render/path_tracer.h"
 #include "render/pixel_sums.h"
 #include "render/render_output.h"
-#include "render/rivals/dual_scattering.h"
 #include "render/single_scattering.h"
 
 namespace heddle {
 
-/// Who shades what an eye ray sees. All but dual scattering take multiple scattering from the
-/// pack's transfer.
-enum class LocalShading : std::uint8_t {
-  kShipped,         // single_scattering.h, multiple_scattering.h
-  kPrinted,         // the same with Gamma and the projection of light as Khungurn 2017 prints them
-  kPrt,             // rivals/prt_scattering.h
-  kTsaiShih16,      // rivals/tsai_shih_scattering.h, 16 terms
-  kTsaiShihFull,    // the same, all terms
-  kDualScattering,  // rivals/dual_scattering.h, single and multiple
-};
-
 struct PrecomputedSettings {
   std::uint64_t seed = 1;
-  LocalShading shading = LocalShading::kShipped;
-  bool volume = false;  // eye rays through the packs' id volumes instead of against fibers
+  RenderMethod method = RenderMethod::kExact;  // one that traces no paths
   // Deviation of the Gaussian; the thickness of the cloth where absent.
   std::optional<double> shadow_sigma_mm;
   VisibilityBlend blend;
@@ -75,61 +59,38 @@ class PrecomputedRenderer {
   PrecomputedRenderer(const ClothScene& scene, std::span<const FabricPack* const> packs,
                       std::span<const Light> lights, const Rgb& background,
                       const PrecomputedSettings& settings);
+  PrecomputedRenderer(const PrecomputedRenderer&) = delete;
+  PrecomputedRenderer& operator=(const PrecomputedRenderer&) = delete;
 
   /// Of the Gaussians that stand for environments; 0 without environments.
   double environment_error() const { return fitted_.relative_error; }
 
-  using Sample = EyeSample;
-  /// What the first sample of a pixel sees; empty where that is no cloth.
-  struct Seen {
-    static constexpr std::uint32_t kNone = 0xffffffffU;
-    std::uint32_t segment;  // kNone on a surface cloth
-    std::uint32_t cell;     // kNone on a surface cloth
-    Vec3d world;
-    Vec3d fabric;
-    Vec3 tangent;
-  };
-
-  /// Samples first .. last - 1 of the pixels of `block`: samples [pixel][sample], pixels row by
-  /// row. Where first is 0, `seen` [pixel] is filled from sample 0.
-  void shade(const Camera& camera, const PixelRect& block, int first, int last,
-             std::vector<Sample>& samples, std::vector<std::optional<Seen>>& seen) const;
+  /// Pass 1: samples first .. last - 1 of the pixels of `block`.
+  GBuffer g_buffer(const Camera& camera, const PixelRect& block, int first, int last) const {
+    return g_buffer_pass_.run(camera, block, first, last);
+  }
+  /// Pass 2.
+  LightVisibility light_visibility(const GBuffer& g_buffer) const {
+    return visibility_pass_.run(g_buffer);
+  }
+  /// Pass 3: [sample of the G-buffer].
+  std::vector<EyeSample> shade(const GBuffer& g_buffer, const LightVisibility& visibility) const;
 
  private:
-  struct Cloth {
-    const FabricPack* pack;
-    std::shared_ptr<const IdBricks> bricks;
-    std::shared_ptr<const SingleScatteringModel> single;
-    std::shared_ptr<const Transfer> cut_transfer;  // in place of the pack's
-    std::optional<MultipleScattering> multiple;
-    std::shared_ptr<const DualScattering> dual;  // then neither single nor multiple
-    double shadow_sigma;                         // mm
-  };
-  /// Is the light visible past all macroscopic things, at the point and at the point moved along
-  /// the cloth?
-  struct GlobalVisibility {
-    bool at_point = false;
-    bool nearby = false;
-  };
-
-  /// A light's share of a sample by dual scattering; a Gaussian's in a direction drawn from it.
-  DualScattering::Parts dual_scattered(const ShellHit& hit, const ShadingPoint& point,
-                                       const Light& light, RandomStream& random) const;
-
-  std::optional<ShellHit> eye_hit(const SceneRay& ray) const;
-  Rgb surface_light(const SurfaceHit& hit, std::uint32_t surface, const Vec3& wo,
-                    RandomStream& random) const;
-  GlobalVisibility global_visibility(const ShellHit& hit, const Light& light,
-                                     RandomStream& random) const;
+  std::vector<std::shared_ptr<const FabricShading>> make_shadings() const;
+  Rgb surface_light(const SeenSurface& surface, RandomStream& random) const;
 
   const ClothScene* scene_;
   std::span<const Light> scene_lights_;  // what sampled surface cloth is lit by
   FittedLights fitted_;
   std::span<const Light> lights_;  // what all else is lit by: environments as Gaussians
-  std::vector<MultipleScattering::LightShape> shapes_;  // [light]
   Rgb background_;
   PrecomputedSettings settings_;
-  std::vector<Cloth> cloths_;
+  std::vector<const FabricPack*> packs_;                        // [cloth of fibers]
+  std::vector<MultipleScattering::LightShape> shapes_;          // [light]
+  std::vector<std::shared_ptr<const FabricShading>> shadings_;  // [cloth of fibers]
+  GBufferPass g_buffer_pass_;
+  LightVisibilityPass visibility_pass_;
 };
 
 /// Beauty, single, multiple, alpha, G-buffer of the first sample; with 2 samples or more also half0

@@ -3,11 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <memory>
+#include <string_view>
 
 #include "render/environment_map.h"
-
 #include "render/surface/surface_presets.h"
 
 namespace heddle {
@@ -205,26 +206,6 @@ ClothConfig read_cloth(const TomlTable& table) {
 }
 
 }  // namespace
-
-std::optional<RenderMethod> render_method_of(std::string_view name) {
-  for (const NamedRenderMethod& named : kRenderMethods) {
-    if (name == named.name) return named.method;
-  }
-  return {};
-}
-
-const char* render_method_name(RenderMethod method) {
-  for (const NamedRenderMethod& named : kRenderMethods) {
-    if (method == named.method) return named.name.data();
-  }
-  return "";
-}
-
-std::vector<std::string_view> render_method_names() {
-  std::vector<std::string_view> names;
-  for (const NamedRenderMethod& named : kRenderMethods) names.push_back(named.name);
-  return names;
-}
 
 SceneConfig read_scene_config(const TomlTable& document) {
   SceneConfig scene;

@@ -4,55 +4,22 @@
 // and ranges: configs/README.md. Lengths in millimetres, angles in radians after parsing. Errors:
 // ConfigError with its place. Tested in tests/render/scene_config_test.cpp.
 
-#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "fibers/math/vector.h"
 #include "formats/toml_table.h"
 #include "render/camera.h"
 #include "render/lights.h"
+#include "render/methods.h"
 #include "render/surface/microcylinder.h"
 #include "render/surface/surface_model.h"
 
 namespace heddle {
-
-enum class RenderMethod : std::uint8_t {
-  kExact,           // precomputed shading, eye rays against the fibers
-  kVolume,          // precomputed shading, eye rays through the id volume
-  kPath,            // the path-traced reference
-  kPath6,           // the same with at most 6 scattering events
-  kPrinted,         // kExact with the choices that Khungurn 2017 prints
-  kPrt,             // kExact with single scattering by standard PRT
-  kTsaiShih16,      // kExact with single scattering by Tsai and Shih 2006, 16 terms
-  kTsaiShihFull,    // the same with all terms
-  kDualScattering,  // Zinke 2008
-};
-
-/// All methods and their names, in the order in which they are listed.
-struct NamedRenderMethod {
-  RenderMethod method;
-  std::string_view name;
-};
-inline constexpr std::array<NamedRenderMethod, 9> kRenderMethods = {
-    {{RenderMethod::kExact, "exact"},
-     {RenderMethod::kVolume, "volume"},
-     {RenderMethod::kPath, "path"},
-     {RenderMethod::kPath6, "path-6"},
-     {RenderMethod::kPrinted, "printed"},
-     {RenderMethod::kPrt, "prt"},
-     {RenderMethod::kTsaiShih16, "tsai-shih-16"},
-     {RenderMethod::kTsaiShihFull, "tsai-shih-full"},
-     {RenderMethod::kDualScattering, "dual-scattering"}}};
-
-constexpr bool traces_paths(RenderMethod method) {
-  return method == RenderMethod::kPath || method == RenderMethod::kPath6;
-}
 
 /// How the precomputed methods shade a cloth without fibers. Traced paths always sample.
 enum class SurfaceMethod : std::uint8_t {
@@ -111,7 +78,6 @@ struct SceneConfig {
   std::vector<ClothConfig> cloths;
   std::vector<MeshFile> meshes;  // black
   RenderMethod method = RenderMethod::kExact;
-  int spp = 16;  // samples per pixel; even where paths are traced
   std::uint64_t seed = 1;
   // smoothing of global visibility; from the fabric where absent
   std::optional<double> shadow_sigma_mm;
@@ -119,11 +85,6 @@ struct SceneConfig {
 
 /// Reads a whole scene document, finish() included.
 SceneConfig read_scene_config(const TomlTable& document);
-
-/// By the names of kRenderMethods; nothing for another name.
-std::optional<RenderMethod> render_method_of(std::string_view name);
-const char* render_method_name(RenderMethod method);
-std::vector<std::string_view> render_method_names();
 
 }  // namespace heddle
 

@@ -1,8 +1,8 @@
 #ifndef HEDDLE_PIPELINE_CHART_CHART_RUNS_H_
 #define HEDDLE_PIPELINE_CHART_CHART_RUNS_H_
-// The runs of `heddle chart`: every method at a ladder of settings, as one plain table. A method is
-// added by its rows in chart_runs(); everything else (measuring, tables, charts) goes by what the
-// rows say. docs/chart.md lists the ladders. Tested in tests/pipeline/chart_test.cpp.
+// The runs of `heddle chart`: every method at a ladder of settings, as one plain table. A method
+// has one row in kLadders (chart_runs.cpp); everything else (measuring, tables, charts) goes by
+// what the runs say. docs/chart.md lists the ladders. Tested in tests/pipeline/chart_test.cpp.
 
 #include <nlohmann/json.hpp>
 #include <string>

@@ -16,6 +16,16 @@ using Json = nlohmann::ordered_json;
 
 constexpr int kFormatVersion = 3;
 
+/// A cost's name in the file: "maps", or "transfer, cells x 2".
+std::string name_of(const CostKey& key) {
+  return key.setting.empty() ? key.stage : key.stage + ", " + key.setting;
+}
+CostKey cost_key_of(const std::string& name) {
+  const std::size_t comma = name.find(", ");
+  if (comma == std::string::npos) return {name};
+  return {name.substr(0, comma), name.substr(comma + 2)};
+}
+
 /// Between which two values of an increasing list, and how far on the way.
 struct Place {
   std::size_t low = 0;
@@ -147,8 +157,8 @@ Json accuracy_json(const AccuracyTable& table) {
                                 {"bent", entries_json(setting.bent)}});
   }
   json["costs"] = Json::object();
-  for (const auto& [part, cost] : table.costs) {
-    json["costs"][part] = {{"seconds", cost.seconds}, {"core_seconds", cost.core_seconds}};
+  for (const auto& [key, cost] : table.costs) {
+    json["costs"][name_of(key)] = {{"seconds", cost.seconds}, {"core_seconds", cost.core_seconds}};
   }
   return json;
 }
@@ -206,8 +216,9 @@ AccuracyTable read_accuracy(const std::filesystem::path& path) {
       }
       table.settings.push_back(std::move(setting));
     }
-    for (const auto& [part, cost] : json.at("costs").items()) {
-      table.costs[part] = {cost.at("seconds").get<double>(), cost.at("core_seconds").get<double>()};
+    for (const auto& [name, cost] : json.at("costs").items()) {
+      table.costs[cost_key_of(name)] = {cost.at("seconds").get<double>(),
+                                        cost.at("core_seconds").get<double>()};
     }
     return table;
   } catch (const nlohmann::json::exception& error) {
@@ -252,9 +263,9 @@ std::string accuracy_text(const AccuracyTable& table) {
   }
   text +=
       fmt::format("lit from behind: {:.2f} of what it shows lit from its face\n", table.through);
-  for (const auto& [part, cost] : table.costs) {
-    text +=
-        fmt::format("to build {:<26} {:.3g} s ({} threads)\n", part, cost.seconds, table.threads);
+  for (const auto& [key, cost] : table.costs) {
+    text += fmt::format("to build {:<26} {:.3g} s ({} threads)\n", name_of(key), cost.seconds,
+                        table.threads);
   }
   return text;
 }

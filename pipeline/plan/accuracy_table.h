@@ -6,6 +6,7 @@
 // small JSON file, the artifact of the stage `accuracy`; the planner reads it before anything else
 // is built. Errors: FileError. Tested in tests/pipeline/plan_test.cpp.
 
+#include <compare>
 #include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -40,6 +41,13 @@ struct SettingAccuracy {
   std::vector<Accuracy> bent;     // [light], a folded swatch in pixels of bent_footprint_mm
 };
 
+/// One thing that was built for a table: a stage, with one setting of the fabric changed or none.
+struct CostKey {
+  std::string stage;         // "maps", "transfer", ...
+  std::string setting = {};  // that was changed, by its name in the table: "cells x 2"; or empty
+  auto operator<=>(const CostKey&) const = default;
+};
+
 struct AccuracyTable {
   std::string fabric;                // its name
   std::string key;                   // of the stage
@@ -60,8 +68,7 @@ struct AccuracyTable {
   // face; 0 of surfaces, which are alike on both sides.
   double through = 0;
   std::vector<SettingAccuracy> settings;  // "path" first
-  // of building, by part: "maps", "transfer, cells x 2", ...
-  std::map<std::string, WorkTime> costs;
+  std::map<CostKey, WorkTime> costs;      // of building
 
   bool has(const std::string& setting) const;
   const SettingAccuracy& setting(const std::string& name) const;

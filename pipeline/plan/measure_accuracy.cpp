@@ -522,9 +522,10 @@ AccuracyTable measure_accuracy(AccuracyData& data, std::uint64_t seed,
   maker.add_between(paths(swatch, effort.path_samples, 0, false));
   maker.add("path-6", paths(swatch, effort.method_samples, 6));
   maker.add("dual-scattering",
-            with([](auto& settings) { settings.shading = LocalShading::kDualScattering; }));
+            with([](auto& settings) { settings.method = RenderMethod::kDualScattering; }));
   maker.add("exact", precomputed(swatch, pack, usual));
-  maker.add("volume", with([](auto& settings) { settings.volume = true; }), "exact");
+  maker.add("volume", with([](auto& settings) { settings.method = RenderMethod::kVolume; }),
+            "exact");
   maker.add(kDistanceSetting, with([](auto& settings) { settings.blend = kSignedDistanceOnly; }),
             "exact");
   maker.add(kGaussiansSetting, with([](auto& settings) { settings.blend = kLobesOnly; }), "exact");
@@ -542,8 +543,8 @@ AccuracyTable measure_accuracy(AccuracyData& data, std::uint64_t seed,
   pack.transfer = own;
   for (auto& [factor, volume] : data.voxels) {
     std::swap(*pack.volume, volume);
-    maker.add(voxels_setting(factor), with([](auto& settings) { settings.volume = true; }),
-              "volume");
+    maker.add(voxels_setting(factor),
+              with([](auto& settings) { settings.method = RenderMethod::kVolume; }), "volume");
     std::swap(*pack.volume, volume);
   }
   return maker.take();

@@ -11,7 +11,6 @@
 #include "pipeline/plan/enclosure.h"
 #include "pipeline/plan/measure_accuracy.h"
 #include "pipeline/plan/probe.h"
-#include "pipeline/scene_needs.h"
 
 namespace heddle {
 namespace {
@@ -747,20 +746,18 @@ class ScenePlanner {
 
   static double predicted_seconds(const AccuracyTable& table, const std::string& stage,
                                   const SceneVariant::OfFabric& of) {
-    const auto seconds_of = [&](const std::string& part) {
-      const auto found = table.costs.find(part);
+    const auto seconds_of = [&](const std::string& setting) {
+      const auto found = table.costs.find({stage, setting});
       if (found == table.costs.end()) return 0.0;
       return table.threads == working_threads() ? found->second.seconds
                                                 : found->second.core_seconds / working_threads();
     };
     if (stage == "voxelize" && of.variant.voxel_rate != 1)
-      return seconds_of(stage + ", " + voxels_setting(of.variant.voxel_rate));
-    double seconds = seconds_of(stage);
+      return seconds_of(voxels_setting(of.variant.voxel_rate));
+    double seconds = seconds_of("");
     if (stage != "transfer" || !(seconds > 0)) return seconds;
-    if (of.variant.cell_size != 1)
-      seconds = seconds_of(stage + ", " + cells_setting(of.variant.cell_size));
-    if (of.order)
-      seconds *= seconds_of(stage + ", " + order_setting(*of.order)) / seconds_of(stage);
+    if (of.variant.cell_size != 1) seconds = seconds_of(cells_setting(of.variant.cell_size));
+    if (of.order) seconds *= seconds_of(order_setting(*of.order)) / seconds_of("");
     return seconds;
   }
 

@@ -142,17 +142,34 @@ TEST(Chart, FormsOfVisibilityFollowTheLights) {
 }
 
 TEST(Chart, LaddersHoldEverySetting) {
-  const std::vector<ChartRun> runs = chart_runs(scene_of_fibers(), {}, {});
+  SceneConfig scene = scene_of_fibers();
+  scene.cloths[0].fabric = "warm.toml";
+  scene.cloths.push_back(scene.cloths[0]);
+  scene.cloths.emplace_back().fabric = "cool.toml";
+  const std::vector<ChartRun> runs = chart_runs(scene, {}, {});
+  for (const std::string_view method : render_method_names())
+    EXPECT_GE(labels_of(runs, std::string(method)).size(), 3U) << method;
   EXPECT_EQ(labels_of(runs, "path").size(), 5U);
   EXPECT_EQ(labels_of(runs, "exact, order of the transfer").size(), 6U);
   EXPECT_EQ(labels_of(runs, "exact, size of the cells"),
             (std::vector<std::string>{"cells x 4", "cells x 2", "cells x 1"}));
   for (const ChartRun& run : runs) {
-    EXPECT_TRUE(run.request.method != RenderMethod::kPath || run.request.spp % 2 == 0)
+    EXPECT_TRUE(!traces_paths(run.request.method) || run.request.spp % 2 == 0)
         << "a path tracer keeps two halves";
     EXPECT_EQ(run.request.local, run.method == "path, local");
     EXPECT_EQ(run.settings.at("spp"), run.request.spp);
-    EXPECT_EQ(run.settings.contains("order"), run.variant.order.has_value());
+    // Every fabric of the scene, or none.
+    EXPECT_TRUE(run.variant.fabrics.empty() || run.variant.fabrics.size() == 2);
+    for (const char* fabric : {"warm.toml", "cool.toml"}) {
+      const SceneVariant::OfFabric of = run.variant.of(fabric);
+      EXPECT_EQ(run.settings.contains("order"), of.order.has_value());
+      EXPECT_EQ(run.settings.value("cell_size", 1.0), of.variant.cell_size);
+      EXPECT_EQ(run.settings.value("voxel_rate", 1.0), of.variant.voxel_rate);
+    }
+    // A run that changes nothing needs no data of its own.
+    if (run.label == "cells x 1" || run.label == "voxels x 1") {
+      EXPECT_EQ(run.variant, SceneVariant{});
+    }
   }
   EXPECT_LT(chart_runs(scene_of_fibers(), {}, {.quick = true}).size(), runs.size());
   EXPECT_TRUE(labels_of(chart_runs(SceneConfig{}, {}, {}), "exact, order of the transfer").empty());

@@ -730,17 +730,17 @@ void store_table(const Workshop& shop, double bias) {
   for (const char* name : {"volume", "voxels x 0.5", "Gaussians", "cells x 4"})
     add(name, 2, 1, 1e-6);
   // Enough that what data take decides between ways that are alike.
-  for (const auto& [part, seconds] :
-       std::map<std::string, double>{{"maps", 0.01},
-                                     {"ssdf", 0.01},
-                                     {"sg", 0.2},
-                                     {"transfer", 0.1},
-                                     {"transfer, cells x 2", 0.02},
-                                     {"transfer, cells x 4", 0.01},
-                                     {"transfer, order 1", 0.1},
-                                     {"voxelize", 0.01},
-                                     {"voxelize, voxels x 0.5", 0.01}}) {
-    table.costs[part] = {seconds, seconds};
+  for (const auto& [key, seconds] :
+       std::map<CostKey, double>{{{"maps"}, 0.01},
+                                 {{"ssdf"}, 0.01},
+                                 {{"sg"}, 0.2},
+                                 {{"transfer"}, 0.1},
+                                 {{"transfer", "cells x 2"}, 0.02},
+                                 {{"transfer", "cells x 4"}, 0.01},
+                                 {{"transfer", "order 1"}, 0.1},
+                                 {{"voxelize"}, 0.01},
+                                 {{"voxelize", "voxels x 0.5"}, 0.01}}) {
+    table.costs[key] = {seconds, seconds};
   }
   publish_artifact(path, fs::path(path).replace_extension(".record.json"),
                    [&](const fs::path& file) {

@@ -399,7 +399,7 @@ AccuracyTable small_table() {
        0.25,
        {entry(11), entry(1), entry(12), entry(2), entry(13), entry(3), entry(14), entry(4)},
        {entry(5), entry(7)}}};
-  table.costs = {{"maps", {1.5, 3.0}}, {"transfer, cells x 2", {2.5, 5.0}}};
+  table.costs = {{{"maps"}, {1.5, 3.0}}, {{"transfer", "cells x 2"}, {2.5, 5.0}}};
   return table;
 }
 

@@ -154,10 +154,10 @@ TEST(PrecomputedRendererLaw, RivalsShowTheOpenFurnaceAsOne) {
   // light 1 is 1.
   const auto world =
       make_world(open_pack(white_isotropic(), true), {gaussian({0, 0, 1}, 0, 4 * kPif)});
-  for (const LocalShading shading :
-       {LocalShading::kPrt, LocalShading::kTsaiShih16, LocalShading::kTsaiShihFull}) {
+  for (const RenderMethod method :
+       {RenderMethod::kPrt, RenderMethod::kTsaiShih16, RenderMethod::kTsaiShihFull}) {
     PrecomputedSettings settings;
-    settings.shading = shading;
+    settings.method = method;
     const FrameBuffers frame = shade_picture(world->renderer(settings), camera_above(1, 12, 8),
                                              {0, 0, 12, 8}, 1, kNoProgress);
     for (std::size_t k = 0; k < frame.pixel_count(); ++k) {
@@ -178,7 +178,7 @@ TEST(PrecomputedRenderer, DualScatteringNeedsNothingBaked) {
   const auto shipped = make_world(open_pack(cotton), {directional({0.4F, 0.1F, 1}, 2)});
   const Camera camera = camera_above(0.4, 16, 16);
   PrecomputedSettings settings;
-  settings.shading = LocalShading::kDualScattering;
+  settings.method = RenderMethod::kDualScattering;
   const FrameBuffers dual =
       shade_picture(world->renderer(settings), camera, {0, 0, 16, 16}, 1, kNoProgress);
   const FrameBuffers open =
@@ -333,7 +333,7 @@ TEST(PrecomputedRenderer, ALowerOrderIsThatOfDataCutToIt) {
 TEST(PrecomputedRendererAgreement, VolumeSeesWhatFibersShow) {
   const auto world = make_world(open_pack(test_cotton()), {directional({0.3F, 0.2F, 1}, 1)});
   PrecomputedSettings settings;
-  settings.volume = true;
+  settings.method = RenderMethod::kVolume;
   const Camera camera = camera_above(0.5, 48, 48);
   const FrameBuffers fibers =
       shade_picture(world->renderer(), camera, {0, 0, 48, 48}, 1, kNoProgress);
@@ -356,6 +356,50 @@ TEST(PrecomputedRendererAgreement, VolumeSeesWhatFibersShow) {
   EXPECT_GT(both, 48 * 48 / 2);
   EXPECT_GT(same_fiber, 0.85 * both);
   EXPECT_GT(near, 0.97 * same_fiber);
+}
+
+TEST(PrecomputedRendererLaw, AKeptGBufferIsRelit) {
+  // By the second and the third pass of a renderer with other lights: what that renderer shows
+  // itself. Where only brightness differs, the visibility serves too.
+  const Light sun = directional({0.3F, 0.2F, 1}, 1);
+  const Light lamp = gaussian({-0.5F, 0, 1}, 150, 2);
+  const auto lit_by = [](std::vector<Light> lights) {
+    return make_world(open_pack(test_cotton()), std::move(lights), {half_roof()});
+  };
+  const auto kept_world = lit_by({sun});
+  const auto world = lit_by({lamp, sun});
+  const auto dim_world =
+      lit_by({gaussian({-0.5F, 0, 1}, 150, 0.25F), directional({0.3F, 0.2F, 1}, 3)});
+  for (const RenderMethod method :
+       {RenderMethod::kExact, RenderMethod::kVolume, RenderMethod::kDualScattering}) {
+    PrecomputedSettings settings;
+    settings.method = method;
+    const Camera camera = camera_above(2, 20, 20);
+    const PixelRect block{3, 5, 12, 9};
+    const PrecomputedRenderer first = kept_world->renderer(settings);
+    const PrecomputedRenderer second = world->renderer(settings);
+    const PrecomputedRenderer third = dim_world->renderer(settings);
+    const GBuffer kept = first.g_buffer(camera, block, 2, 7);
+    const LightVisibility visibility = second.light_visibility(kept);
+    const auto expect_same = [&](const PrecomputedRenderer& renderer,
+                                 const LightVisibility& visible) {
+      const std::vector<EyeSample> relit = renderer.shade(kept, visible);
+      const GBuffer own = renderer.g_buffer(camera, block, 2, 7);
+      const std::vector<EyeSample> expected = renderer.shade(own, renderer.light_visibility(own));
+      ASSERT_EQ(relit.size(), expected.size());
+      float brightest = 0;
+      for (std::size_t k = 0; k < relit.size(); ++k) {
+        ASSERT_TRUE((relit[k].single == expected[k].single).all());
+        ASSERT_TRUE((relit[k].multiple == expected[k].multiple).all());
+        ASSERT_TRUE((relit[k].background == expected[k].background).all());
+        ASSERT_EQ(relit[k].alpha, expected[k].alpha);
+        brightest = std::max(brightest, relit[k].multiple.maxCoeff());
+      }
+      EXPECT_GT(brightest, 0);
+    };
+    expect_same(second, visibility);
+    expect_same(third, visibility);
+  }
 }
 
 TEST(PrecomputedRendererEndToEnd, MoreSamplesMakeThePictureOfAll) {
@@ -413,7 +457,7 @@ TEST(PrecomputedRenderer, SaysWhatThePackLacks) {
   const auto fails = [](FabricPack pack, const Light& light, bool volume) {
     const auto world = make_world(std::move(pack), {light});
     PrecomputedSettings settings;
-    settings.volume = volume;
+    if (volume) settings.method = RenderMethod::kVolume;
     EXPECT_THROW(world->renderer(settings), FileError);
   };
   const Light sharp = directional({0, 0, 1}, 1);

@@ -241,11 +241,5 @@ TEST_F(SceneConfigTest, ASceneNeedsLightAndCloth) {
       std::string::npos);
 }
 
-TEST(SceneConfig, MethodNamesRoundTrip) {
-  for (const char* name : {"exact", "volume", "path"})
-    EXPECT_STREQ(render_method_name(*render_method_of(name)), name);
-  EXPECT_FALSE(render_method_of("fast"));
-}
-
 }  // namespace
 }  // namespace heddle

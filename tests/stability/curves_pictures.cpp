@@ -112,10 +112,11 @@ Curve cells_curve(Effort effort) {
   const int spp = effort == Effort::kFull ? 256 : 128;
   const PictureResult truth = pipeline.picture(scene, RenderMethod::kPath, spp);
   for (const double factor : factors) {
-    const SceneVariant variant{
-        .order = {}, .fabric = {.cell_size = factor}, .blend = {}, .surface_method = {}};
+    const FabricVariant cells{.cell_size = factor};
+    const SceneVariant variant =
+        variant_of_fabrics(pipeline.job(scene).config(), {.variant = cells});
     const PictureResult fast = pipeline.picture(scene, RenderMethod::kExact, spp, true, variant);
-    const FabricPack pack = pipeline.pack(variant.fabric);
+    const FabricPack pack = pipeline.pack(cells);
     curve.drivers.push_back(pack_facts(pack, TileScene(pack.exemplar)).cell_mean_free_paths);
     curve.series[0].values.push_back(relative_error(fast.image, truth.image));
     curve.series[1].values.push_back(

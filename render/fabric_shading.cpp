@@ -1,0 +1,113 @@
+#include "render/fabric_shading.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+namespace heddle {
+namespace {
+
+/// What a light sends to a cell from one direction.
+struct KeptLight {
+  std::uint32_t cell = 0xffffffffU;
+  Vec3 axis = Vec3::Zero();  // fabric space
+  CellLight light;
+};
+
+std::unique_ptr<const Transfer> cut_transfer(const ShadingInputs& inputs) {
+  if (!inputs.transfer_order) return nullptr;
+  return std::make_unique<const Transfer>(
+      cut_to_order(*inputs.pack->transfer, *inputs.transfer_order));
+}
+
+}  // namespace
+
+TransferShading::TransferShading(const ShadingInputs& inputs,
+                                 std::unique_ptr<const SingleScatteringModel> single)
+    : scene_(inputs.scene),
+      lights_(inputs.lights),
+      shapes_(inputs.shapes),
+      single_(std::move(single)),
+      cut_transfer_(cut_transfer(inputs)),
+      transfer_(cut_transfer_ ? cut_transfer_.get() : &*inputs.pack->transfer),
+      multiple_(*transfer_, inputs.pack->materials, inputs.pack->bundle_tangent) {}
+
+void TransferShading::shade(const GBuffer& g_buffer, const LightVisibility& visibility,
+                            std::span<const std::uint32_t> fibers,
+                            std::span<EyeSample> seen) const {
+  const int values = 3 * transfer_->coefficients();
+  std::vector<KeptLight> kept(lights_.size());
+  for (const std::uint32_t k : fibers) {
+    const ShadingPoint& point = g_buffer.fibers[k].point;
+    EyeSample& sample = seen[g_buffer.fibers[k].sample];
+    IncomingField field;
+    std::fill_n(field.begin(), values, 0.0F);
+    bool any_nearby = false;
+    for (std::size_t l = 0; l < lights_.size(); ++l) {
+      const Light& light = lights_[l];
+      const LightVisibility::OfLight visible = visibility.of(k, l);
+      if (!visible.at_point && !visible.nearby) continue;
+      const DirectionPair axis = {light.axis,
+                                  scene_->fabric_direction(g_buffer.fibers[k].hit, light.axis)};
+      if (visible.at_point) {
+        sample.single +=
+            light.irradiance * (light.is_directional()
+                                    ? single_->directional(point, axis)
+                                    : single_->spherical_gaussian(point, axis, light.sharpness));
+      }
+      if (!visible.nearby) continue;
+      any_nearby = true;
+      KeptLight& own = kept[l];
+      if (own.cell != point.cell || own.axis != axis.fabric) {
+        own.cell = point.cell;
+        own.axis = axis.fabric;
+        multiple_.incoming(point.cell, shapes_[l], axis.fabric, own.light);
+      }
+      for (int j = 0; j < values; ++j) field[j] += light.irradiance[j % 3] * own.light.harmonics[j];
+      sample.multiple +=
+          light.irradiance * multiple_.outgoing_from_cones(own.light, shapes_[l], axis.fabric,
+                                                           point.segment, point.material,
+                                                           point.tangent.fabric, point.wo.fabric);
+    }
+    if (any_nearby) {
+      sample.multiple +=
+          multiple_.outgoing(field, point.material, point.tangent.fabric, point.wo.fabric);
+    }
+  }
+}
+
+DualScatteringShading::DualScatteringShading(const ShadingInputs& inputs)
+    : scene_(inputs.scene),
+      pack_(inputs.pack),
+      lights_(inputs.lights),
+      dual_(*inputs.tile, inputs.pack->materials) {}
+
+void DualScatteringShading::shade(const GBuffer& g_buffer, const LightVisibility& visibility,
+                                  std::span<const std::uint32_t> fibers,
+                                  std::span<EyeSample> seen) const {
+  for (const std::uint32_t k : fibers) {
+    EyeSample& sample = seen[g_buffer.fibers[k].sample];
+    for (std::size_t l = 0; l < lights_.size(); ++l) {
+      if (!visibility.of(k, l).at_point) continue;
+      const DualScattering::Parts parts =
+          scattered(g_buffer.fibers[k], visibility.direction[k * lights_.size() + l]);
+      sample.single += lights_[l].irradiance * parts.single;
+      sample.multiple += lights_[l].irradiance * parts.multiple;
+    }
+  }
+}
+
+DualScattering::Parts DualScatteringShading::scattered(const SeenFiber& fiber,
+                                                       const Vec3& direction) const {
+  const Vec3 fabric = scene_->fabric_direction(fiber.hit, direction);
+  if (!pack_->light_from_both_sides && !(fabric.z() > 0)) return {};
+  // The hit in the base tile.
+  const Exemplar& exemplar = pack_->exemplar;
+  Vec3d position = fiber.hit.fabric;
+  position.x() -= std::floor(position.x() / exemplar.width_mm) * exemplar.width_mm;
+  position.y() -= std::floor(position.y() / exemplar.height_mm) * exemplar.height_mm;
+  return dual_.directional(fiber.point, position.cast<float>(), {direction, fabric});
+}
+
+}  // namespace heddle

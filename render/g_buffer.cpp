@@ -1,0 +1,68 @@
+#include "render/g_buffer.h"
+
+#include <utility>
+
+namespace heddle {
+
+RandomStream GBuffer::random(std::uint64_t seed, RandomStage stage, std::uint32_t sample) const {
+  const int pixel = static_cast<int>(sample) / per_pixel();
+  const auto x = static_cast<std::uint64_t>(block.x0 + pixel % block.width);
+  const auto y = static_cast<std::uint64_t>(block.y0 + pixel / block.width);
+  return {seed, stage, y * frame_width + x,
+          static_cast<std::uint64_t>(first + static_cast<int>(sample) % per_pixel())};
+}
+
+GBufferPass::GBufferPass(const ClothScene& scene, std::vector<const FabricPack*> packs,
+                         std::vector<std::shared_ptr<const IdBricks>> bricks, std::uint64_t seed)
+    : scene_(&scene), packs_(std::move(packs)), bricks_(std::move(bricks)), seed_(seed) {}
+
+GBuffer GBufferPass::run(const Camera& camera, const PixelRect& block, int first, int last) const {
+  GBuffer g_buffer;
+  g_buffer.block = block;
+  g_buffer.first = first;
+  g_buffer.last = last;
+  g_buffer.frame_width = static_cast<std::uint64_t>(camera.width());
+  g_buffer.covered.assign(g_buffer.sample_count(), 0);
+  for (std::uint32_t sample = 0; sample < g_buffer.sample_count(); ++sample) {
+    const int pixel = static_cast<int>(sample) / g_buffer.per_pixel();
+    RandomStream random = g_buffer.random(seed_, RandomStage::kEyeRay, sample);
+    const double x = block.x0 + pixel % block.width + random.uniform_double();
+    const double y = block.y0 + pixel / block.width + random.uniform_double();
+    look(camera.ray(x, y), sample, g_buffer);
+  }
+  return g_buffer;
+}
+
+std::optional<ShellHit> GBufferPass::first_fiber(const SceneRay& ray) const {
+  if (bricks_.empty()) return scene_->first_fiber(ray);
+  return scene_->first_hit(ray, RayReach::kEverything,
+                           [this](std::uint32_t cloth, const Ray& local, std::uint32_t) {
+                             return bricks_[cloth]->first_hit(local);
+                           });
+}
+
+void GBufferPass::look(const EyeRay& ray, std::uint32_t sample, GBuffer& g_buffer) const {
+  SceneRay scene_ray{ray.origin, ray.direction};
+  const std::optional<MeshHit> mesh = scene_->first_mesh(ray.origin, ray.direction);
+  if (mesh) scene_ray.t_max = mesh->t;
+  const std::optional<ShellHit> hit = first_fiber(scene_ray);
+  const Vec3 wo = -ray.direction;
+  g_buffer.covered[sample] = hit || mesh ? 1 : 0;
+  if (hit) {
+    const FabricPack& pack = *packs_[hit->cloth];
+    const ShadingPoint point{
+        hit->segment,
+        pack.transfer ? pack.transfer->cell_of_segment[hit->segment] : 0,
+        pack.exemplar.segment_material(hit->segment),
+        {scene_->world_tangent(*hit), pack.exemplar.segment_tangent(hit->segment)},
+        {wo, scene_->fabric_direction(*hit, wo)}};
+    g_buffer.fibers.push_back({sample, *hit, point});
+  } else if (mesh && mesh->surface != nullptr) {
+    g_buffer.surfaces.push_back(
+        {sample, mesh->mesh,
+         mesh->surface->hit(mesh->triangle, mesh->u, mesh->v, ray.direction, ray.spread * mesh->t),
+         wo});
+  }
+}
+
+}  // namespace heddle

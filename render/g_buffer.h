@@ -1,0 +1,81 @@
+#ifndef HEDDLE_RENDER_G_BUFFER_H_
+#define HEDDLE_RENDER_G_BUFFER_H_
+// First pass of the precomputed methods: what the eye rays of a block of pixels see. It knows no
+// light, so one G-buffer serves any lighting of the same view. Eye rays are those of the path
+// tracer with the same seed. Tested in tests/render/precomputed_renderer_test.cpp.
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "fibers/baked/fabric_pack.h"
+#include "fibers/baked/id_bricks.h"
+#include "fibers/math/random.h"
+#include "fibers/math/vector.h"
+#include "render/camera.h"
+#include "render/cloth_scene.h"
+#include "render/single_scattering.h"
+#include "render/surface_cloth.h"
+
+namespace heddle {
+
+/// A sample that sees fibers.
+struct SeenFiber {
+  std::uint32_t sample;  // which of the block's
+  ShellHit hit;
+  ShadingPoint point;
+};
+
+/// A sample that sees cloth without fibers.
+struct SeenSurface {
+  std::uint32_t sample;   // which of the block's
+  std::uint32_t surface;  // of ClothScene::surfaces()
+  SurfaceHit hit;
+  Vec3 wo;  // world
+};
+
+/// Samples first .. last - 1 of every pixel of `block`: sample k is number first + k % per_pixel()
+/// of pixel k / per_pixel(), pixels row by row.
+struct GBuffer {
+  PixelRect block;
+  int first = 0;
+  int last = 0;
+  std::uint64_t frame_width = 0;  // px, of the whole picture
+  // [sample] meets cloth or a mesh
+  std::vector<std::uint8_t> covered;
+  // In the order of their samples; a covered sample in neither sees black.
+  std::vector<SeenFiber> fibers;
+  std::vector<SeenSurface> surfaces;
+
+  int per_pixel() const { return last - first; }
+  std::uint32_t sample_count() const {
+    return static_cast<std::uint32_t>(block.width * block.height * per_pixel());
+  }
+  /// Random numbers of one sample. They are addressed by the pixel of the whole picture, so they
+  /// depend neither on the crop nor on the block.
+  RandomStream random(std::uint64_t seed, RandomStage stage, std::uint32_t sample) const;
+};
+
+class GBufferPass {
+ public:
+  /// packs: [cloth of fibers]. bricks: the same, or empty: eye rays then look for the fibers
+  /// themselves. The scene and the packs outlive the object.
+  GBufferPass(const ClothScene& scene, std::vector<const FabricPack*> packs,
+              std::vector<std::shared_ptr<const IdBricks>> bricks, std::uint64_t seed);
+
+  GBuffer run(const Camera& camera, const PixelRect& block, int first, int last) const;
+
+ private:
+  std::optional<ShellHit> first_fiber(const SceneRay& ray) const;
+  void look(const EyeRay& ray, std::uint32_t sample, GBuffer& g_buffer) const;
+
+  const ClothScene* scene_;
+  std::vector<const FabricPack*> packs_;
+  std::vector<std::shared_ptr<const IdBricks>> bricks_;
+  std::uint64_t seed_;
+};
+
+}  // namespace heddle
+
+#endif  // HEDDLE_RENDER_G_BUFFER_H_

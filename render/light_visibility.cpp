@@ -1,0 +1,73 @@
+#include "render/light_visibility.h"
+
+#include <cmath>
+#include <optional>
+#include <utility>
+
+namespace heddle {
+namespace {
+
+/// Draws after which a light counts as wholly behind the cloth. Of a light with a tenth of its mass
+/// in front, 3 % of the draws find none of it.
+constexpr int kFaceDraws = 32;
+
+Vec2 sample_gaussian2(RandomStream& random) {
+  const float radius = std::sqrt(-2 * std::log(1 - random.uniform()));
+  const float angle = 2 * kPif * random.uniform();
+  return radius * Vec2(std::cos(angle), std::sin(angle));
+}
+
+}  // namespace
+
+LightVisibilityPass::LightVisibilityPass(const ClothScene& scene, std::vector<Cloth> cloths,
+                                         std::span<const Light> lights, bool draw_directions,
+                                         std::uint64_t seed)
+    : scene_(&scene),
+      cloths_(std::move(cloths)),
+      lights_(lights),
+      draw_directions_(draw_directions),
+      seed_(seed) {}
+
+LightVisibility LightVisibilityPass::run(const GBuffer& g_buffer) const {
+  const std::size_t count = g_buffer.fibers.size() * lights_.size();
+  LightVisibility result;
+  result.lights = lights_.size();
+  result.visible.reserve(count);
+  if (draw_directions_) result.direction.reserve(count);
+  for (const SeenFiber& fiber : g_buffer.fibers) {
+    RandomStream random = g_buffer.random(seed_, RandomStage::kLightVisibility, fiber.sample);
+    for (const Light& light : lights_) {
+      const LightVisibility::OfLight visible = find(fiber.hit, light, random);
+      result.visible.push_back(visible);
+      if (!draw_directions_) continue;
+      result.direction.push_back(visible.at_point ? sample_light(light, random).direction
+                                                  : Vec3(0, 0, 0));
+    }
+  }
+  return result;
+}
+
+LightVisibility::OfLight LightVisibilityPass::find(const ShellHit& hit, const Light& light,
+                                                   RandomStream& random) const {
+  const Cloth& cloth = cloths_[hit.cloth];
+  Vec3 direction = light.axis;
+  float height = 0;
+  for (int draw = 0; draw < kFaceDraws; ++draw) {
+    if (!light.is_directional()) direction = sample_light(light, random).direction;
+    height = scene_->fabric_direction(hit, direction).z();
+    if (cloth.light_from_both_sides || height > 0 || light.is_directional()) break;
+  }
+  if (!cloth.light_from_both_sides && !(height > 0)) return {};
+  const ClothSide side = height > 0 ? ClothSide::kFace : ClothSide::kBack;
+
+  LightVisibility::OfLight result;
+  result.at_point = scene_->globally_visible(scene_->surface_point(hit, side), direction);
+  const Eigen::Vector2d moved =
+      hit.fabric.head<2>() + cloth.shadow_sigma_mm * sample_gaussian2(random).cast<double>();
+  const std::optional<Shell::SurfacePoint> nearby = scene_->surface_point(hit, moved, side);
+  // Beyond a rim there is no cloth to take light from.
+  result.nearby = nearby ? scene_->globally_visible(*nearby, direction) : result.at_point;
+  return result;
+}
+
+}  // namespace heddle
