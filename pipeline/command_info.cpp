@@ -18,9 +18,9 @@
 #include "formats/input_error.h"
 #include "formats/obj_mesh.h"
 #include "formats/tensor_file.h"
+#include "pipeline/accuracy/accuracy_table.h"
 #include "pipeline/commands.h"
 #include "pipeline/json_file.h"
-#include "pipeline/plan/accuracy_table.h"
 #include "pipeline/stages.h"
 #include "render/scene_config.h"
 

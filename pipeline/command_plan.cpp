@@ -11,9 +11,9 @@ int plan_command(const PlanOptions& options, const CommonOptions& common) {
   const ScenePlan plan = make_plan({.scene = options.scene,
                                     .view = options.view,
                                     .crop = options.crop,
-                                    .tolerance = options.tolerance,
-                                    .pictures = options.pictures,
-                                    .may_build = false},
+                                    .target = {.tolerance = options.tolerance,
+                                               .pictures = options.pictures,
+                                               .may_build = false}},
                                    job.context());
   std::cout << (common.json ? plan_json(plan).dump(2) + "\n" : plan_text(plan));
   return plan.chosen ? 0 : 1;

@@ -8,10 +8,10 @@
 #include "formats/atomic_file.h"
 #include "formats/file_ending.h"
 #include "formats/input_error.h"
+#include "pipeline/accuracy/probe.h"
 #include "pipeline/commands.h"
 #include "pipeline/job.h"
 #include "pipeline/picture_request.h"
-#include "pipeline/plan/probe.h"
 #include "pipeline/plan/scene_plan.h"
 #include "pipeline/scene_job.h"
 #include "render/render_output.h"
@@ -67,20 +67,19 @@ int render_within(double tolerance, const RenderOptions& options, Job& job) {
         "--tolerance chooses method, samples and data: not together with --method, --spp, "
         "--seconds, --local, --bounces, --estimator or --order");
   }
-  const ScenePlan plan = make_plan({.scene = options.scene,
-                                    .view = options.view,
-                                    .crop = options.crop,
-                                    .tolerance = tolerance,
-                                    .pictures = options.pictures,
-                                    .may_build = true},
-                                   job.context());
+  const ScenePlan plan = make_plan(
+      {.scene = options.scene,
+       .view = options.view,
+       .crop = options.crop,
+       .target = {.tolerance = tolerance, .pictures = options.pictures, .may_build = true}},
+      job.context());
   if (!plan.chosen) {
     job.console().warn(plan_text(plan) + "nothing rendered");
     return 1;
   }
   job.console().say(plan_text(plan));
   const Way& way = plan.ways[*plan.chosen];
-  SceneJob scene(options.scene, job.context(), way.variant);
+  SceneJob scene(options.scene, job.context(), way.settings.variant);
   PictureRequest request = plan.request;
   request.spp = first_samples(way.candidate, tolerance);
   Estimate noise_square;  // of a sample

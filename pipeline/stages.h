@@ -35,9 +35,9 @@
 #include "fibers/cloth/fabric_config.h"
 #include "fibers/tracing/segment_origins.h"
 #include "fibers/tracing/tile_scene.h"
+#include "pipeline/accuracy/accuracy_table.h"
 #include "pipeline/cache.h"
 #include "pipeline/console.h"
-#include "pipeline/plan/accuracy_table.h"
 #include "pipeline/work_time.h"
 #include "precompute/transfer_bake.h"
 #include "precompute/visibility_settings.h"
@@ -179,8 +179,8 @@ class FabricStages {
   Artifact volume();
   Artifact pack(const Needs& needs);
 
-  /// What the methods are worth on this fabric (pipeline/plan/measure_accuracy.h). With a surface
-  /// model: what that is worth in place of the fibers.
+  /// What the methods are worth on this fabric (pipeline/accuracy/measure_accuracy.h). With a
+  /// surface model: what that is worth in place of the fibers.
   Artifact accuracy(const SurfaceFabric* surface = nullptr);
   /// Where that lies, built or not; builds the fibers only.
   Artifact accuracy_place(const SurfaceFabric* surface = nullptr);

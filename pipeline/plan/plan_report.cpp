@@ -25,11 +25,11 @@ std::string seconds_text(double seconds) {
 
 /// Which form of visibility a way takes for a light.
 const char* visibility_of(const Way& way, const Light& light) {
-  if (!is_precomputed(way.method)) return "none";
+  if (!is_precomputed(way.settings.method)) return "none";
   if (light.type == LightType::kEnvironment) return "by the sharpness of its Gaussians";
   if (light.is_directional()) return "signed distances";
-  const bool distance = way.variant.blend.uses_distance(light.sharpness);
-  const bool lobes = way.variant.blend.uses_lobes(light.sharpness);
+  const bool distance = way.settings.variant.blend.uses_distance(light.sharpness);
+  const bool lobes = way.settings.variant.blend.uses_lobes(light.sharpness);
   if (distance && lobes) return "signed distances and Gaussians";
   return distance ? "signed distances" : "Gaussians";
 }
@@ -44,14 +44,14 @@ std::string light_name(const Light& light) {
 Json cloth_json(const ScenePlan& plan, const Way& way, std::size_t k) {
   const ClothConfig& cloth = plan.scene.cloths[k];
   if (cloth.surface) return {{"drawn_by", "surface"}, {"surface", cloth.surface->name}};
-  if (way.variant.stand_ins.contains(k))
+  if (way.settings.variant.stand_ins.contains(k))
     return {{"drawn_by", "surface"}, {"surface", cloth.far_surface->name}};
   Json json = {{"drawn_by", "fibers"}, {"fabric", cloth.fabric.generic_string()}};
-  if (!is_precomputed(way.method)) return json;
-  const SceneVariant::OfFabric of = way.variant.of(cloth.fabric);
+  if (!is_precomputed(way.settings.method)) return json;
+  const SceneVariant::OfFabric of = way.settings.variant.of(cloth.fabric);
   json["cell_size"] = of.variant.cell_size;
   json["order"] = of.order ? Json(*of.order) : Json(nullptr);
-  if (way.method == RenderMethod::kVolume) json["voxel_rate"] = of.variant.voxel_rate;
+  if (way.settings.method == RenderMethod::kVolume) json["voxel_rate"] = of.variant.voxel_rate;
   return json;
 }
 
@@ -60,7 +60,7 @@ std::string cloth_text(const ScenePlan& plan, const Way& way, std::size_t k) {
   if (json.at("drawn_by") == "surface")
     return "surface model " + json.at("surface").get<std::string>();
   std::string text = "fibers";
-  if (!is_precomputed(way.method)) return text;
+  if (!is_precomputed(way.settings.method)) return text;
   text += fmt::format(", cells x {:g}", json.at("cell_size").get<double>());
   text += json.at("order").is_null() ? ", the fabric's order"
                                      : fmt::format(", order {}", json.at("order").get<int>());
@@ -76,13 +76,15 @@ std::vector<const Way*> notable(const ScenePlan& plan) {
   if (plan.chosen) list.push_back(&plan.ways[*plan.chosen]);
   std::set<std::string> families;
   for (const Way& way : plan.ways) {
-    if (!families.insert(way.family).second) continue;
+    if (!families.insert(family_of(way.settings)).second) continue;
     const Way* best = nullptr;
     for (const Way& other : plan.ways) {
-      if (other.family != way.family) continue;
+      if (family_of(other.settings) != family_of(way.settings)) continue;
       if (best == nullptr) best = &other;
-      const auto a = offer(other.candidate, plan.question.tolerance, plan.question.pictures);
-      const auto b = offer(best->candidate, plan.question.tolerance, plan.question.pictures);
+      const auto a =
+          offer(other.candidate, plan.question.target.tolerance, plan.question.target.pictures);
+      const auto b =
+          offer(best->candidate, plan.question.target.tolerance, plan.question.target.pictures);
       if (a && b ? a->seconds < b->seconds
                  : a.has_value() > b.has_value() ||
                        (!a && !b &&
@@ -98,14 +100,14 @@ std::vector<const Way*> notable(const ScenePlan& plan) {
 Json way_json(const ScenePlan& plan, const Way& way) {
   const Candidate& candidate = way.candidate;
   Json json = {{"name", candidate.name},
-               {"method", render_method_name(way.method)},
+               {"method", render_method_name(way.settings.method)},
                {"bias", root(candidate.bias_square.value)},
                {"noise_of_a_sample", root(candidate.noise_square.value)},
                {"known_from", way.tried ? "a pilot of this view" : "the table of the fabric"},
                {"build_seconds", candidate.build_seconds},
                {"setup_seconds", candidate.setup_seconds},
                {"seconds_per_sample_per_pixel", candidate.seconds_per_spp}};
-  const auto made = offer(candidate, plan.question.tolerance, plan.question.pictures);
+  const auto made = offer(candidate, plan.question.target.tolerance, plan.question.target.pictures);
   json["meets_tolerance"] = made.has_value();
   if (made) {
     json["spp"] = made->spp;
@@ -117,9 +119,11 @@ Json way_json(const ScenePlan& plan, const Way& way) {
 }
 
 std::string why(const ScenePlan& plan, const Way& way) {
-  const auto made = offer(way.candidate, plan.question.tolerance, plan.question.pictures);
+  const auto made =
+      offer(way.candidate, plan.question.target.tolerance, plan.question.target.pictures);
   if (!made) {
-    const bool by_bias = root(way.candidate.bias_square.value) > 0.7 * plan.question.tolerance;
+    const bool by_bias =
+        root(way.candidate.bias_square.value) > 0.7 * plan.question.target.tolerance;
     return by_bias ? "too far from path tracing" : "too many samples";
   }
   return fmt::format("{} spp, {}", made->spp, seconds_text(made->seconds));
@@ -131,8 +135,9 @@ std::string plan_text(const ScenePlan& plan) {
   const PlanQuestion& question = plan.question;
   std::string text = fmt::format(
       "plan      {}{}, relative RMSE at most {}, {}\n", plan.scene.name,
-      question.view.empty() ? "" : ", view " + question.view, percent(question.tolerance),
-      question.pictures == 1 ? "one picture" : fmt::format("{} pictures", question.pictures));
+      question.view.empty() ? "" : ", view " + question.view, percent(question.target.tolerance),
+      question.target.pictures == 1 ? "one picture"
+                                    : fmt::format("{} pictures", question.target.pictures));
   if (plan.chosen) {
     const Way& way = plan.ways[*plan.chosen];
     text +=
@@ -144,7 +149,8 @@ std::string plan_text(const ScenePlan& plan) {
                                            100 * seen.share, seen.footprint_mm)
                              : "\n";
     }
-    for (std::size_t l = 0; l < plan.scene.lights.size() && is_precomputed(way.method); ++l) {
+    for (std::size_t l = 0; l < plan.scene.lights.size() && is_precomputed(way.settings.method);
+         ++l) {
       const Light& light = plan.scene.lights[l];
       text += fmt::format("light {:<3} {}: visibility by {}\n", l + 1, light_name(light),
                           visibility_of(way, light));
@@ -152,9 +158,10 @@ std::string plan_text(const ScenePlan& plan) {
     text += fmt::format("error     {} expected: {} apart from noise ({}), {} noise\n",
                         percent(plan.offer->expected_error),
                         percent(root(way.candidate.bias_square.value)),
-                        traces_paths(way.method) && way.family == "path" ? "none by definition"
-                        : way.tried                                      ? "table and pilot"
-                                                                         : "table",
+                        traces_paths(way.settings.method) && family_of(way.settings) == "path"
+                            ? "none by definition"
+                        : way.tried ? "table and pilot"
+                                    : "table",
                         percent(root(way.candidate.noise_square.value / plan.offer->spp)));
     text +=
         fmt::format("cost      {}: {} to build, {} per picture; the plan took {}\n",
@@ -185,8 +192,8 @@ Json plan_json(const ScenePlan& plan) {
                {"version", 1},
                {"scene", plan.scene.name},
                {"view", question.view},
-               {"tolerance", question.tolerance},
-               {"pictures", question.pictures},
+               {"tolerance", question.target.tolerance},
+               {"pictures", question.target.pictures},
                {"meets_tolerance", plan.chosen.has_value()},
                {"best_tolerance", plan.best_tolerance},
                {"plan_seconds", plan.time.seconds},

@@ -11,9 +11,9 @@
 #include <sstream>
 
 #include "formats/image_file.h"
+#include "pipeline/accuracy/accuracy_table.h"
 #include "pipeline/artifact_record.h"
 #include "pipeline/picture_request.h"
-#include "pipeline/plan/accuracy_table.h"
 #include "pipeline/scene_job.h"
 #include "pipeline/stages.h"
 #include "pipeline/work_time.h"

@@ -34,6 +34,12 @@ const std::map<std::string, std::set<std::string>> kArrows = {
     {"pipeline", {"formats", "fibers/math", "fibers", "precompute", "render"}},
 };
 
+/// Within the pipeline: files (regular expression) and what they must not include.
+const std::vector<std::pair<std::string, std::string>> kNotWithinPipeline = {
+    {R"(pipeline/accuracy/.*)", R"(pipeline/(plan/.*|stages\.h|surface_stages\.h|scene_job\.h))"},
+    {R"(pipeline/(stages|surface_stages|scene_job)\..*)", R"(pipeline/plan/.*)"},
+};
+
 /// Third-party headers and the files (regular expression) that may include them.
 const std::vector<std::pair<std::string, std::string>> kConfined = {
     {R"(embree3?/.*)", R"((fibers|render)/.*\.cpp)"},
@@ -94,6 +100,16 @@ std::string broken_arrow(const Include& include) {
   return include.file + " (" + from + ") must not include " + include.target + " (" + to + ")";
 }
 
+std::string broken_within_pipeline(const Include& include) {
+  for (const auto& [files, targets] : kNotWithinPipeline) {
+    if (std::regex_match(include.file, std::regex(files)) &&
+        std::regex_match(include.target, std::regex(targets))) {
+      return include.file + " must not include " + include.target;
+    }
+  }
+  return "";
+}
+
 std::string broken_confinement(const Include& include) {
   for (const auto& [header, files] : kConfined) {
     if (std::regex_match(include.target, std::regex(header)) &&
@@ -127,6 +143,16 @@ TEST(IncludeGraph, ThirdPartyHeadersStayInFewFiles) {
   }
 }
 
+TEST(IncludeGraph, StagesLieAboveAccuracyAndBelowPlans) {
+  std::size_t of_accuracy = 0;
+  for (const std::string& file : source_files()) {
+    if (file.starts_with("pipeline/accuracy/")) ++of_accuracy;
+    for (const Include& include : includes_of(file, text_of(file)))
+      EXPECT_EQ(broken_within_pipeline(include), "");
+  }
+  EXPECT_GT(of_accuracy, 0U);
+}
+
 TEST(IncludeGraph, GuardsMatchPaths) {
   for (const std::string& file : source_files()) {
     if (!file.ends_with(".h")) continue;
@@ -149,6 +175,10 @@ TEST(IncludeGraph, WouldSeeAWrongInclude) {
   EXPECT_EQ(broken_confinement({"fibers/tracing/x.cpp", "embree3/rtcore.h", false}), "");
   EXPECT_NE(broken_confinement({"render/x.h", "tbb/parallel_for.h", false}), "");
   EXPECT_NE(broken_confinement({"formats/x.h", "Eigen/Core", false}), "");
+  EXPECT_NE(broken_within_pipeline({"pipeline/stages.cpp", "pipeline/plan/x.h", true}), "");
+  EXPECT_NE(broken_within_pipeline({"pipeline/accuracy/x.cpp", "pipeline/stages.h", true}), "");
+  EXPECT_EQ(broken_within_pipeline({"pipeline/stages.h", "pipeline/accuracy/x.h", true}), "");
+  EXPECT_EQ(broken_within_pipeline({"pipeline/plan/x.cpp", "pipeline/stages.h", true}), "");
   EXPECT_EQ(expected_guard("formats/x_y.h"), "HEDDLE_FORMATS_X_Y_H_");
 }
 

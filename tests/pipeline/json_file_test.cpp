@@ -5,7 +5,7 @@
 #include <string>
 
 #include "formats/json_text.h"
-#include "pipeline/plan/accuracy_table.h"
+#include "pipeline/accuracy/accuracy_table.h"
 #include "pipeline/warnings.h"
 #include "tests/formats/file_fixture.h"
 

@@ -1,23 +1,18 @@
-// Plans: arithmetic on hand-made candidates, statistics on frames of known noise and bias, tables.
+// Plans: choice among hand-made candidates, priors from hand-made tables, evidence of pilots.
 
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <fstream>
 #include <random>
-#include <sstream>
+#include <set>
 
-#include "formats/input_error.h"
-#include "pipeline/plan/accuracy_table.h"
-#include "pipeline/plan/enclosure.h"
-#include "pipeline/plan/measure_accuracy.h"
-#include "pipeline/plan/planner.h"
-#include "pipeline/plan/probe.h"
-#include "pipeline/stages.h"
+#include "pipeline/accuracy/measure_accuracy.h"
+#include "pipeline/plan/choice.h"
+#include "pipeline/plan/evidence.h"
+#include "pipeline/plan/findings.h"
+#include "pipeline/plan/prior.h"
+#include "pipeline/plan/ways.h"
 #include "render/pixel_sums.h"
-#include "tests/pipeline/small_fabric.h"
-#include "tests/support/small_exemplars.h"
-#include "tests/support/temporary_folder.h"
 
 namespace heddle {
 namespace {
@@ -90,7 +85,7 @@ TEST(Plan, MoreCautionWhereItCostsLittle) {
   EXPECT_FALSE(offer(near, 0.2, 1));
 }
 
-TEST(Plan, AtBestIsBelowWhatIsThought) {
+TEST(Plan, AtBestIsBelowWhatIsExpected) {
   EXPECT_LT(at_best({1, 0.5}).value, 1);
   EXPECT_EQ(at_best({1, 0}).value, 1);
   EXPECT_EQ(at_best({0.1, 5}).value, 0) << "no square is negative";
@@ -104,7 +99,7 @@ TEST(Plan, PicturesGoOnUntilTheirOwnNoiseIsSmallEnough) {
     EXPECT_LE(spp, offer(of, tolerance, 1)->spp);
     EXPECT_EQ(spp % of.spp_step, 0);
     EXPECT_GE(spp, 2);
-    // Four times the variance that the candidate was thought to have, and not quite sure of it.
+    // Four times the variance that the candidate was expected to have, and not quite sure of it.
     const Estimate noise = {4 * of.noise_square.value, 0.2 * of.noise_square.value};
     for (int more = 1; more > 0; spp += more) {
       more = more_samples(of, noise, spp, tolerance);
@@ -133,18 +128,18 @@ TEST(Plan, CheapestThatIsGoodEnough) {
   EXPECT_EQ(name_at(0.09, 1), "path");   // no other is near enough
 }
 
-TEST(Plan, WhatIsKnownIsPreferredToWhatCostsLittleLess) {
+TEST(Plan, WhatWasTriedIsPreferredToWhatCostsLittleLess) {
   const std::vector<Candidate> list = {
-      candidate("path", 0, 4, 0, 0.05, 2), candidate("known", 0.1, 1, 0, 0.011),
-      candidate("unknown", 0.1, 1, 0, 0.01), candidate("far cheaper", 0.1, 1, 0, 0.003)};
-  const auto chosen = [&](std::size_t count, const std::vector<bool>& known) {
-    return cheapest_known(std::span(list).first(count), known, 0.15, 1).value();
+      candidate("path", 0, 4, 0, 0.05, 2), candidate("tried", 0.1, 1, 0, 0.011),
+      candidate("untried", 0.1, 1, 0, 0.01), candidate("far cheaper", 0.1, 1, 0, 0.003)};
+  const auto chosen = [&](std::size_t count, const std::vector<bool>& tried) {
+    return choose(std::span(list).first(count), tried, 0.15, 1).value();
   };
   EXPECT_EQ(chosen(3, {true, true, false}), 1U);
-  EXPECT_EQ(chosen(3, {true, false, false}), 2U) << "paths are known, and cost much more";
+  EXPECT_EQ(chosen(3, {true, false, false}), 2U) << "paths were tried, and cost much more";
   EXPECT_EQ(chosen(3, {true, true, true}), 2U);
   EXPECT_EQ(chosen(4, {true, true, true, false}), 3U);
-  EXPECT_FALSE(cheapest_known(list, {true, true, true, true}, 1e-6, 1));
+  EXPECT_FALSE(choose(list, {true, true, true, true}, 1e-6, 1));
 }
 
 TEST(Plan, OfWhatCostsLittleMoreTheOneThatErrsLeast) {
@@ -154,14 +149,14 @@ TEST(Plan, OfWhatCostsLittleMoreTheOneThatErrsLeast) {
   const double cheapest_seconds = offer(list[0], 0.2, 1)->seconds;
   ASSERT_GT(offer(list[1], 0.2, 1)->seconds, cheapest_seconds);
   ASSERT_GT(offer(list[2], 0.2, 1)->seconds, 1.5 * cheapest_seconds);
-  EXPECT_EQ(cheapest_known(list, {true, true, true}, 0.2, 1), 1U);
-  EXPECT_EQ(cheapest_known(list, {true, false, false}, 0.2, 1), 0U) << "what is known goes first";
+  EXPECT_EQ(choose(list, {true, true, true}, 0.2, 1), 1U);
+  EXPECT_EQ(choose(list, {true, false, false}, 0.2, 1), 0U) << "what was tried goes first";
   std::vector<Candidate> alike = {candidate("changed", 0.1, 1, 0, 0.01),
                                   candidate("own", 0.1, 1, 0, 0.0105)};
   alike[0].changes = 2;
-  EXPECT_EQ(cheapest_known(alike, {true, true}, 0.2, 1), 1U);
+  EXPECT_EQ(choose(alike, {true, true}, 0.2, 1), 1U);
   alike[1].seconds_per_spp = 0.02;
-  EXPECT_EQ(cheapest_known(alike, {true, true}, 0.2, 1), 0U) << "that much cheaper";
+  EXPECT_EQ(choose(alike, {true, true}, 0.2, 1), 0U) << "that much cheaper";
 }
 
 TEST(Plan, TighterTolerancesNeverGetCheaper) {
@@ -207,7 +202,7 @@ TEST(Plan, PilotsRaiseAndLowerWhatTablesSay) {
   // All noise, it says nothing.
   EXPECT_NEAR(weighed(table, {-3, 50}, 0).value, 0.1, 1e-4);
   EXPECT_NEAR(weighed(table, {3, 50}, 0).value, 0.1, 1e-4);
-  // A negative square is noise: it lowers what is thought, but does not make nothing of it.
+  // A negative square is noise: it lowers the prior, but does not make it 0.
   EXPECT_GT(weighed(table, {-0.2, 0.02}, 0).value, 0.07);
   EXPECT_LT(weighed(table, {-0.2, 0.02}, 0).value, 0.1);
   // Of few pixels, it counts for about as much as the table, whichever of the two is the lower.
@@ -221,347 +216,268 @@ TEST(Plan, PilotsRaiseAndLowerWhatTablesSay) {
   EXPECT_LT(weighed(table, {0.05, 0.001}, 0.2).value, lowered.value);
 }
 
-TEST(Probe, BlocksLieInsideAndApart) {
-  const PixelRect rectangle{3, 5, 61, 30};
-  for (const int pixels : {1, 300, 100000}) {
-    std::vector<int> covered(100 * 100, 0);
-    int count = 0;
-    for (const PixelRect& block : spread_blocks(rectangle, 8, pixels)) {
-      for (int y = block.y0; y < block.y0 + block.height; ++y) {
-        for (int x = block.x0; x < block.x0 + block.width; ++x) {
-          ASSERT_TRUE(3 <= x && x < 64 && 5 <= y && y < 35);
-          EXPECT_EQ(covered[static_cast<std::size_t>(100 * y + x)]++, 0);
-          ++count;
-        }
-      }
-    }
-    EXPECT_NEAR(count, std::min(pixels, 61 * 30), pixels < 61 * 30 ? 64 : 0);
-  }
-}
-
-TEST(Probe, BlocksReachAllOfAPicture) {
-  // A quarter of the blocks: every quadrant holds about a quarter of them.
-  int quadrants[4] = {};
-  for (const PixelRect& block : spread_blocks({0, 0, 256, 256}, 8, 128 * 128)) {
-    ++quadrants[(block.x0 >= 128) + 2 * (block.y0 >= 128)];
-  }
-  for (const int blocks : quadrants) EXPECT_NEAR(blocks, 64, 13);
-}
-
-/// Blocks of pixels whose eye rays bring noise that both pictures share, and each a noise of its
-/// own.
-struct Drawn {
-  std::vector<FrameBuffers> reference;
-  std::vector<FrameBuffers> picture;
-};
-Drawn draw(double bias, double shared, double own, int samples) {
-  std::mt19937 engine(7);
-  std::normal_distribution<double> normal;
-  Drawn drawn;
-  for (int block = 0; block < 64; ++block) {
-    FrameBuffers frames[2] = {FrameBuffers(8, 8), FrameBuffers(8, 8)};
-    for (FrameBuffers& frame : frames) {
-      frame.spp = samples;
-      frame.half0.resize(64);
-      frame.half1.resize(64);
-      frame.variance.resize(64);
-    }
-    for (std::size_t k = 0; k < 64; ++k) {
-      PixelSums sums[2];
-      // The same everywhere in a pixel, another sign in the next.
-      const double pixel_bias = k % 2 == 0 ? bias : -bias;
-      for (int s = 0; s < samples; ++s) {
-        const double common = 1 + shared * normal(engine);
-        for (int p = 0; p < 2; ++p) {
-          const auto value = static_cast<float>(common + own * normal(engine) + p * pixel_bias);
-          sums[p].add({Rgb(value, value, value), Rgb::Zero(), Rgb::Zero(), 1}, s);
-        }
-      }
-      for (int p = 0; p < 2; ++p) sums[p].store(samples, k, frames[p]);
-    }
-    drawn.reference.push_back(frames[0]);
-    drawn.picture.push_back(frames[1]);
-  }
-  return drawn;
-}
-
-TEST(ProbeStatistical, NoiseIsTheVarianceOfASample) {
-  const Drawn drawn = draw(0.3, 0.8, 0.6, 8);
-  const Estimate variance = sample_variance(drawn.picture);
-  EXPECT_NEAR(variance.value, 1.0, 4 * variance.error);
-  EXPECT_LT(variance.error, 0.03);
-  EXPECT_NEAR(mean_radiance(drawn.picture), 1.0, 4 / std::sqrt(64.0 * 64 * 8));
-}
-
-TEST(ProbeStatistical, BiasIsFoundUnderNoise) {
-  for (const double bias : {0.0, 0.1, 0.3}) {
-    const Drawn drawn = draw(bias, 5.0, 0.5, 8);
-    const Estimate square = squared_bias(drawn.picture, drawn.reference);
-    EXPECT_NEAR(square.value, bias * bias, 4 * square.error) << bias;
-    EXPECT_LT(square.error, 0.01) << "noise of common eye rays drops out";
-  }
-}
-
-TEST(ProbeStatistical, SmoothDifferencesAreFoundUnderMuchNoise) {
-  const Drawn drawn = draw(0, 0, 5.0, 8);
-  std::vector<FrameBuffers> brighter = drawn.picture;
-  for (FrameBuffers& frame : brighter) {
-    for (std::vector<Rgb>* half : {&frame.half0, &frame.half1}) {
-      for (Rgb& value : *half) value += 0.3F;
-    }
-  }
-  const Estimate square = squared_bias_of_means(brighter, drawn.reference);
-  EXPECT_NEAR(square.value, 0.09, 4 * square.error);
-  // Of a block's half, of 64 pixels and 4 samples, in each of two pictures; and its product with
-  // the difference.
-  const double variance = 2 * 25.0 / (64 * 4);
-  EXPECT_LT(square.error, 2 * std::sqrt((variance * variance + 2 * variance * 0.09) / 64));
-  EXPECT_GT(squared_bias(brighter, drawn.reference).error, 5 * square.error);
-}
-
-/// A picture of 64 x 64 pixels with so many samples, whose noise doubles every 32 columns and of
-/// which a share of samples is bright.
-FrameBuffers noisy(int samples, double share_of_bright, double bright, std::uint32_t seed) {
-  std::mt19937 engine(seed);
-  std::normal_distribution<double> normal;
-  std::uniform_real_distribution<double> uniform;
-  FrameBuffers frame(64, 64);
-  frame.spp = samples;
-  frame.half0.resize(64 * 64);
-  frame.half1.resize(64 * 64);
-  frame.variance.resize(64 * 64);
-  for (std::size_t k = 0; k < frame.pixel_count(); ++k) {
-    PixelSums sums;
-    for (int s = 0; s < samples; ++s) {
-      const double spread = k % 64 < 32 ? 1 : 2;
-      const auto value = static_cast<float>(1 + spread * normal(engine) +
-                                            (uniform(engine) < share_of_bright ? bright : 0));
-      sums.add({Rgb(value, value, value), Rgb::Zero(), Rgb::Zero(), 1}, s);
-    }
-    sums.store(samples, k, frame);
-  }
-  return frame;
-}
-
-TEST(ProbeStatistical, APictureKnowsHowWellItKnowsItsNoise) {
-  // Known noise, half of the pixels with 1 and half with 4: no error but that of each pixel's 15
-  // degrees of freedom.
-  const Estimate even = sample_variance_of_all(noisy(16, 0, 0, 3));
-  EXPECT_NEAR(even.value, 2.5, 4 * even.error);
-  EXPECT_NEAR(even.error, std::sqrt((1 + 16) / 2.0 * 2 / 15 / 4096), 0.1 * even.error);
-  // Every 3000th sample is brighter by 200: of the variance 13.3 of it, known from about 22 of
-  // them, to 1 / sqrt(22).
-  double within = 0;
-  for (std::uint32_t seed = 0; seed < 40; ++seed) {
-    const Estimate rare = sample_variance_of_all(noisy(16, 1 / 3000.0, 200, 100 + seed));
-    EXPECT_GT(rare.error, 0.1 * rare.value) << seed;
-    EXPECT_LT(rare.error, 0.5 * rare.value) << seed;
-    if (std::abs(rare.value - (2.5 + 200 * 200 / 3000.0)) < rare.error) ++within;
-  }
-  // Of 40, 27 are expected within one standard error.
-  EXPECT_NEAR(within / 40, 0.68, 4 * std::sqrt(0.68 * 0.32 / 40));
-}
-
-TEST(Plan, WhatIsSeenOfOneWayHoldsOfItsLike) {
-  const Estimate like_thought{0.2, 0.1};
-  // Worse than thought: so is the other, by as much. Better: by the same factor, so that no square
+TEST(Plan, WhatAPilotShowsOfOneWayHoldsOfItsKind) {
+  const Estimate prior_of_similar{0.2, 0.1};
+  // Worse than expected: so is the other, by as much. Better: by the same factor, so that no square
   // turns negative.
-  EXPECT_NEAR(alike({0.3, 0.2}, like_thought, {0.5, 0.05}).value, 0.6, 1e-12);
-  EXPECT_NEAR(alike({0.3, 0.2}, like_thought, {0.05, 0.02}).value, 0.075, 1e-12);
-  EXPECT_EQ(alike({0.3, 0.2}, like_thought, {0, 0.02}).value, 0);
-  // As sure as the one that was seen, where both were thought to err alike; less sure where not.
-  EXPECT_NEAR(alike({0.2, 0.1}, like_thought, {0.25, 0.03}).error, 0.03, 1e-12);
-  EXPECT_GT(alike({0.4, 0.2}, like_thought, {0.25, 0.03}).error, 0.05);
+  EXPECT_NEAR(transferred({0.3, 0.2}, prior_of_similar, {0.5, 0.05}).value, 0.6, 1e-12);
+  EXPECT_NEAR(transferred({0.3, 0.2}, prior_of_similar, {0.05, 0.02}).value, 0.075, 1e-12);
+  EXPECT_EQ(transferred({0.3, 0.2}, prior_of_similar, {0, 0.02}).value, 0);
+  // As sure as the one that was seen, where both have the same prior; less sure where not.
+  EXPECT_NEAR(transferred({0.2, 0.1}, prior_of_similar, {0.25, 0.03}).error, 0.03, 1e-12);
+  EXPECT_GT(transferred({0.4, 0.2}, prior_of_similar, {0.25, 0.03}).error, 0.05);
 }
 
-AccuracyTable small_table() {
+/// A table in which every setting errs by the same everywhere; colours are even.
+AccuracyTable even_table() {
   AccuracyTable table;
-  table.fabric = "cloth \"of\" gold";
-  table.key = "0123";
-  table.threads = 2;
-  table.sharpness = {10, 1000};
-  table.footprint_mm = {0.1, 0.4};
+  table.fabric = "even";
+  table.sharpness = {10, kDirectionalSharpness};
+  table.footprint_mm = {0.1, 1};
   table.light_cosine = {0.5, 0.9};
-  const auto entry = [](double bias) {
-    return Accuracy{bias, 0.01, 2 * bias, 3 * bias, Rgbd(1, 0.9, 1.1)};
-  };
   table.bent_footprint_mm = 3;
   table.bent_light_cosine = 0.7;
-  table.bent_between = {0.2, 0.4};
-  table.bent_enclosure_square = 0.05;
-  table.color = Rgbd(1.5, 1, 0.5);
-  table.through = 0.25;
-  // [light][footprint][height]: low light errs by 10 more.
-  table.settings = {
-      {"path", 1e-5, 0.5, std::vector<Accuracy>(8, entry(0)), {entry(0), entry(0)}},
-      {"exact",
-       1e-6,
-       0.25,
-       {entry(11), entry(1), entry(12), entry(2), entry(13), entry(3), entry(14), entry(4)},
-       {entry(5), entry(7)}}};
-  table.costs = {{{"maps"}, {1.5, 3.0}}, {{"transfer", "cells x 2"}, {2.5, 5.0}}};
+  table.bent_between = {0.1, 0.1};
+  table.bent_enclosure_square = 0.02;
+  const auto add = [&](const std::string& name, double bias_square, double change_square,
+                       double noise_square, double seconds, const Rgbd& ratio = Rgbd::Ones()) {
+    const Accuracy entry{bias_square, 0, noise_square, change_square, ratio};
+    table.settings.push_back(
+        {name, seconds, 0.25, std::vector<Accuracy>(8, entry), std::vector<Accuracy>(2, entry)});
+  };
+  add("path", 0, 0, 4, 1e-4);
+  add("exact", 0.04, 0, 1, 1e-6, Rgbd::Constant(0.9));
+  add("volume", 0.05, 0.01, 1, 2e-6);
+  add(order_setting(1), 0.03, 0.02, 1, 1e-6, Rgbd::Constant(0.9));
+  add(cells_setting(2), 0.09, 0.02, 1, 1e-6, Rgbd::Constant(0.8));
   return table;
 }
 
-TEST(AccuracyTable, BetweenEntriesInLogarithms) {
-  const AccuracyTable table = small_table();
-  EXPECT_DOUBLE_EQ(table.at("exact", 10, 0.1, 0.9).bias_square, 1);
-  EXPECT_NEAR(table.at("exact", 10, 0.2, 0.9).bias_square, 1.5, 1e-12);
-  EXPECT_NEAR(table.at("exact", 100, 0.2, 0.9).bias_square, 2.5, 1e-12);
-  EXPECT_NEAR(table.at("exact", 100, 0.2, 0.6).bias_square, 10, 1e-12)
-      << "cosines themselves, not their logarithms";
-  EXPECT_DOUBLE_EQ(table.at("exact", 0, 0.001, 1).bias_square, 1)
-      << "the nearest entry beyond the ends";
-  EXPECT_DOUBLE_EQ(table.at("exact", kDirectionalSharpness, 10, 0).bias_square, 14);
-  EXPECT_NEAR(table.at("exact", 100, 0.2, 0.9).change_square, 7.5, 1e-12);
-  EXPECT_NEAR(table.between_at(100), 0.3, 1e-12);
-  EXPECT_DOUBLE_EQ(table.between_at(1), 0.2);
-  EXPECT_THROW(table.at("no such", 10, 0.1, 0.5), FileError);
+SeenCloth seen_under(std::vector<LightShare> lights) {
+  SeenCloth seen;
+  seen.share = 1;
+  seen.light_share = 1;
+  seen.footprint_mm = 0.3;
+  seen.enclosure_square = 0.01;
+  seen.lights = std::move(lights);
+  return seen;
 }
 
-TEST(AccuracyTableFormat, RoundTrip) {
-  const TemporaryFolder folder;
-  const std::filesystem::path path = folder.path() / "table.json";
-  write_accuracy(path, small_table());
-  EXPECT_EQ(accuracy_json(read_accuracy(path)), accuracy_json(small_table()));
-  EXPECT_NE(accuracy_text(small_table()).find("exact"), std::string::npos);
-  AccuracyTable of_surface = small_table();
-  of_surface.costs.clear();
-  write_accuracy(path, of_surface);
-  EXPECT_EQ(accuracy_json(read_accuracy(path)), accuracy_json(of_surface)) << "nothing to build";
+TEST(PlanPrior, OverLightsSquaresAddUpHalfAsIfIndependent) {
+  OverLights one;
+  one.add(1, 0.3);
+  EXPECT_NEAR(one.square(), 0.3, 1e-12);
+  OverLights two;
+  two.add(0.5, 0.3);
+  two.add(0.5, 0.3);
+  EXPECT_NEAR(two.square(), 0.5 * 0.3 + 0.5 * 0.15, 1e-12);
 }
 
-TEST(AccuracyTableFormat, DamagedTablesAreRefused) {
-  const TemporaryFolder folder;
-  const std::filesystem::path path = folder.path() / "table.json";
-  const std::string whole = accuracy_json(small_table()).dump(1) + "\n";
-  for (std::size_t size = 0; size + 2 < whole.size(); size += 7) {
-    std::ofstream(path, std::ios::trunc) << whole.substr(0, size);
-    EXPECT_THROW(read_accuracy(path), FileError) << size;
-  }
-  for (const auto& [from, to] :
-       {std::pair<std::string, std::string>{"\"version\": 3", "\"version\": 99"},
-        {"heddle accuracy", "heddle chart"},
-        {"1000.0", "10.0"},
-        {"0.2,\n  0.4", "0.2"},
-        {"\"threads\": 2", "\"threads\": 2e300"},
-        {"\"threads\": 2", "\"threads\": \"2\""}}) {
-    std::string damaged = whole;
-    ASSERT_NE(damaged.find(from), std::string::npos) << from;
-    std::ofstream(path, std::ios::trunc) << damaged.replace(damaged.find(from), from.size(), to);
-    EXPECT_THROW(read_accuracy(path), FileError) << to;
-  }
+TEST(PlanPrior, OneLightErrsAsTheTableSays) {
+  const AccuracyTable table = even_table();
+  const SeenCloth seen = seen_under({{100, 1, 0.7}});
+  const ClothPrior prior = prior_of_cloth(table, {"exact", {}}, seen, false);
+  EXPECT_NEAR(prior.bias_square.value, 0.04, 1e-12) << "of the mean and of the rest together";
+  EXPECT_NEAR(prior.mean_error, -0.1, 1e-12);
+  EXPECT_NEAR(prior.noise_ratio, 0.25, 1e-12);
+  EXPECT_NEAR(prior.time_ratio, 0.01, 1e-12);
+  EXPECT_EQ(prior.setup_seconds, 0.25);
 }
 
-/// A disk of radius 2 mm, or the half of it with x > 0, `height` over z = 0.
-TriangleMesh roof(float height, bool half) {
-  constexpr int kCorners = 240;
-  TriangleMesh mesh;
-  mesh.positions.emplace_back(0, 0, height);
-  for (int k = 0; k <= kCorners; ++k) {
-    const float angle = (half ? kPif : 2 * kPif) * static_cast<float>(k) / kCorners - 0.5F * kPif;
-    mesh.positions.emplace_back(2 * std::cos(angle), 2 * std::sin(angle), height);
-    if (k > 0)
-      mesh.triangles.push_back(
-          {0, static_cast<std::uint32_t>(k), static_cast<std::uint32_t>(k + 1)});
-  }
-  return mesh;
+TEST(PlanPrior, ErrorsOfTheMeanAddUpOverLightsOthersDoNot) {
+  const AccuracyTable table = even_table();
+  const SeenCloth seen = seen_under({{100, 0.5, 0.7}, {200, 0.5, 0.7}});
+  const double square = prior_of_cloth(table, {"exact", {}}, seen, false).bias_square.value;
+  EXPECT_NEAR(square, 0.01 + 0.75 * 0.03, 1e-12);
 }
 
-// A disk of radius r at height h over a place covers r^2 / (r^2 + h^2) of its cosine-weighted
-// hemisphere.
-TEST(EnclosureLaw, IsTheShareOfTheHemisphereThatIsCovered) {
-  const auto tile = std::make_shared<TileScene>(crossed_layers(test_cotton()));
-  const auto of = [&](std::vector<TriangleMesh> meshes, const Vec3& direction) {
-    const ClothScene scene({{tile, flat_cloth(20, 20)}}, std::move(meshes));
-    // Along a tilted ray that meets the cloth next to the axis of the roof.
-    const std::optional<ShellHit> hit =
-        scene.first_fiber({Vec3d(0.01, 0.01, 0) - 0.5 * direction.cast<double>(), direction});
-    return hit ? enclosure(scene, *hit, direction) : -1.0;
+TEST(PlanPrior, ASettingThatLooksBetterCountsAsWorse) {
+  const AccuracyTable table = even_table();
+  const SeenCloth seen = seen_under({{100, 1, 0.7}});
+  const auto square_with = [&](const std::string& setting) {
+    return prior_of_cloth(table, {"exact", {{setting, "exact"}}}, seen, false).bias_square.value;
   };
-  const Vec3 down = Vec3(0.01F, 0, -1).normalized();
-  const Vec3 up = Vec3(0.01F, 0, 1).normalized();
-  const auto top = static_cast<float>(tile->exemplar().z_max);
-  EXPECT_EQ(of({}, down), 0);
-  EXPECT_NEAR(of({roof(top + 2, false)}, down), 0.5, 0.05);
-  EXPECT_NEAR(of({roof(top + 1, false)}, down), 0.8, 0.05);
-  EXPECT_NEAR(of({roof(top + 4, false)}, down), 0.2, 0.05);
-  EXPECT_NEAR(of({roof(top + 1, true)}, down), 0.4, 0.09);
-  EXPECT_EQ(of({roof(top + 1, false)}, up), 0)
-      << "what is behind the side that is seen does not matter";
+  EXPECT_NEAR(square_with(order_setting(1)), 0.04 + 0.5 * 0.02, 1e-12);
+  // Cells: the mean is 0.8 of path tracing's, the rest as the table says.
+  EXPECT_NEAR(square_with(cells_setting(2)), 0.2 * 0.2 + std::max(0.05, 0.03 + 0.01), 1e-12);
 }
 
-/// The table of the small fabric, measured with little effort.
-AccuracyTable measured_table() {
-  const TemporaryFolder folder;
-  std::ofstream(folder.path() / "fabric.toml") << kSmallFabric;
-  std::ostringstream silent;
-  Console console(silent, false, true);
-  StageContext context{.cache = Cache(folder.path() / "cache"),
-                       .console = &console,
-                       .fabric_seed = {},
-                       .picture_seed = {},
-                       .results = {}};
-  FabricStages stages(folder.path() / "fabric.toml", context);
-  AccuracyData data;
-  data.pack = load_pack(stages.pack(kEverything).path);
-  return measure_accuracy(
-      data, 1, [](double) {},
-      {.pixels = 32, .bent_pixels = 8, .path_samples = 6, .method_samples = 2, .bent_factor = 4});
+TEST(PlanPrior, FoldsMakeItWorseNeverBetter) {
+  AccuracyTable table = even_table();
+  const SeenCloth seen = seen_under({{100, 1, 0.7}});
+  const auto square = [&] {
+    return prior_of_cloth(table, {"exact", {}}, seen, true).bias_square.value;
+  };
+  EXPECT_NEAR(square(), 0.04, 1e-12);
+  for (Accuracy& entry : table.settings[1].bent) entry.bias_square = 0.1;
+  EXPECT_NEAR(square(), 0.1, 1e-12);
+  for (Accuracy& entry : table.settings[1].bent) entry.bias_square = 0.02;
+  EXPECT_NEAR(square(), 0.04, 1e-12);
 }
 
-TEST(MeasureAccuracyStatistical, SaysWhatHoldsOfAnyFabric) {
-  const AccuracyTable table = measured_table();
-  for (std::size_t f = 1; f < table.footprint_mm.size(); ++f) {
-    EXPECT_NEAR(table.footprint_mm[f], 2 * table.footprint_mm[f - 1], 1e-9);
+TEST(PlanPrior, LightFromBehindIsMissing) {
+  SeenCloth seen = seen_under({{100, 1, 0.7}});
+  ClothPrior prior;
+  seen.pixel_lights.resize(4);
+  for (PixelLight& light : seen.pixel_lights) light.face.seen = 1;
+  add_light_from_behind(seen, 0.5, prior);
+  EXPECT_EQ(prior.bias_square.value, 0) << "no light on the back";
+  for (PixelLight& light : seen.pixel_lights) light.back.across = 2;
+  add_light_from_behind(seen, 0.5, prior);
+  // Half of what falls on the back comes through: as much as the face shows.
+  EXPECT_NEAR(prior.bias_square.value, 0.25, 1e-12);
+  EXPECT_NEAR(prior.mean_error, -0.5, 1e-12);
+}
+
+/// A scene of one flat cloth of one fabric under a light of sharpness 15, between both forms of
+/// visibility.
+struct SmallPlan {
+  SceneConfig scene;
+  ViewFacts view;
+  FabricTables tables;
+  SmallPlan() {
+    scene.cloths.resize(1);
+    scene.cloths[0].fabric = "one.toml";
+    view.lights.resize(1);
+    view.lights[0].type = LightType::kSphericalGaussian;
+    view.lights[0].sharpness = 15;
+    view.cloths = {seen_under({{15, 1, 0.7}})};
+    tables.fabrics.push_back({"one.toml", "one", 2, false, even_table()});
   }
-  EXPECT_NEAR(table.footprint_mm[0], 0.02, 1e-5) << "the fibers' diameter";
-  EXPECT_NEAR(table.color.mean(), 1, 1e-9);
-  EXPECT_GT(table.through, 0.01) << "thin cloth lets light through";
-  EXPECT_LT(table.through, 2);
-  ASSERT_EQ(table.light_cosine.size(), 2U);
-  EXPECT_LT(table.light_cosine[0], 0.55);
-  EXPECT_GT(table.light_cosine[1], 0.75);
-  EXPECT_FALSE(table.has(order_setting(3))) << "the fabric's own order is 2";
-  EXPECT_TRUE(table.has(order_setting(1)));
-  for (const double sharpness : table.sharpness) {
-    const auto at = [&](const char* setting, double footprint) {
-      return table.at(setting, sharpness, footprint, 0.8);
-    };
-    for (const double footprint : table.footprint_mm) {
-      EXPECT_EQ(at("path", footprint).bias_square, 0);
-      EXPECT_GT(at("path", footprint).noise_square, at("exact", footprint).noise_square)
-          << sharpness;
-      // Six events are too dark, and differ from all of them by what is missing.
-      EXPECT_LT(at("path-6", footprint).color_ratio.mean(), 1) << sharpness;
+};
+
+TEST(PlanPrior, LightBetweenClothsGoesWithEnclosure) {
+  SmallPlan plan;
+  const Estimate one = prior_between(plan.scene, plan.view, plan.tables);
+  EXPECT_GT(one.value, 0);
+  plan.view.cloths[0].enclosure_square *= 3;
+  EXPECT_NEAR(prior_between(plan.scene, plan.view, plan.tables).value, 3 * one.value, 1e-12);
+  // On half of the picture, with all of its light: twice the square of the mean.
+  plan.view.cloths[0].share = 0.5;
+  EXPECT_NEAR(prior_between(plan.scene, plan.view, plan.tables).value, 6 * one.value, 1e-12);
+}
+
+TEST(PlanWays, EveryChoiceOnce) {
+  SmallPlan plan;
+  const std::vector<WaySettings> ways = other_ways(plan.scene, plan.view, plan.tables);
+  std::set<std::string> names;
+  for (const WaySettings& way : ways) names.insert(name_of(way, plan.scene, plan.tables));
+  EXPECT_EQ(names.size(), ways.size());
+  // Both forms of visibility and their blend; cells x 1, 2, 4; the order 1 below the fabric's 2;
+  // voxels x 1, 0.5 of the volume. And paths of 6 events, and dual scattering.
+  EXPECT_EQ(ways.size(), 3U * (3 * 2 + 2 * 3 * 2) + 2);
+  EXPECT_TRUE(names.contains("volume, Gaussians, cells x 4, order 1, voxels x 0.5"));
+  for (const WaySettings& way : ways) {
+    const std::string name = name_of(way, plan.scene, plan.tables);
+    EXPECT_EQ(changes_of(way, plan.scene, plan.tables), std::count(name.begin(), name.end(), ','))
+        << name;
+  }
+}
+
+TEST(PlanWays, FormsOfVisibilityAreThoseThatTheLightsTellApart) {
+  SmallPlan plan;
+  const auto forms_at = [&](float sharpness) {
+    plan.view.lights[0].sharpness = sharpness;
+    std::set<std::string> forms;
+    for (const WaySettings& way : other_ways(plan.scene, plan.view, plan.tables)) {
+      if (way.variant.blend == kSignedDistanceOnly) forms.insert(kDistanceSetting);
+      if (way.variant.blend == kLobesOnly) forms.insert(kGaussiansSetting);
     }
-    // A wider pixel sees more of the cloth's variety, and averages errors.
-    EXPECT_GE(at("exact", 1).noise_square, at("exact", 0.02).noise_square);
-    EXPECT_LT(at("exact", 1).bias_square,
-              at("exact", 0.02).bias_square + 3 * at("exact", 0.02).bias_square_error);
-  }
-  // What a setting changes is part of what it errs by: the root of one is at most the other's and
-  // the base's together.
-  for (const double sharpness : table.sharpness) {
-    EXPECT_EQ(table.at("exact", sharpness, 0.02, 0.8).change_square, 0);
-    const Accuracy low = table.at(order_setting(1), sharpness, 0.3, 0.8);
-    const Accuracy base = table.at("exact", sharpness, 0.3, 0.8);
-    EXPECT_GT(low.change_square, 0) << sharpness;
-    EXPECT_LT(std::sqrt(low.change_square),
-              std::sqrt(std::max(0.0, low.bias_square) + 2 * low.bias_square_error) +
-                  std::sqrt(std::max(0.0, base.bias_square) + 2 * base.bias_square_error))
-        << sharpness;
-    EXPECT_GT(table.between_at(sharpness), 0) << "folds light each other";
-  }
-  EXPECT_GT(table.bent_enclosure_square, 0.002);
-  EXPECT_LT(table.bent_enclosure_square, 0.1) << "folds of 35 degrees see little of each other";
-  // Light that both forms of visibility treat alike.
-  const auto bias = [&](const char* setting, double sharpness) {
-    return table.at(setting, sharpness, 0.02, 0.8).bias_square;
+    return forms;
   };
-  EXPECT_EQ(bias("Gaussians", kDirectionalSharpness), bias("exact", kDirectionalSharpness));
-  EXPECT_EQ(bias("signed distance", 1000), bias("exact", 1000));
-  EXPECT_NE(bias("signed distance", 3), bias("exact", 3));
+  EXPECT_EQ(forms_at(15), (std::set<std::string>{kDistanceSetting, kGaussiansSetting}));
+  EXPECT_EQ(forms_at(100), std::set<std::string>{kGaussiansSetting});
+  EXPECT_EQ(forms_at(3), std::set<std::string>{kDistanceSetting});
+  plan.view.lights[0].type = LightType::kDirectional;
+  EXPECT_TRUE(forms_at(100).empty());
+}
+
+/// A pilot of a picture of one value in blocks of 8 x 8 pixels, with noise of standard deviation
+/// `noise` per sample and +-`bias` from pixel to pixel.
+Pilot pilot_of(double value, double bias, double noise, std::uint32_t seed) {
+  std::mt19937 engine(seed);
+  std::normal_distribution<double> normal;
+  Pilot pilot;
+  pilot.spp = 8;
+  for (int block = 0; block < 16; ++block) {
+    FrameBuffers frame(8, 8);
+    frame.spp = pilot.spp;
+    frame.half0.resize(64);
+    frame.half1.resize(64);
+    frame.variance.resize(64);
+    for (std::size_t k = 0; k < 64; ++k) {
+      PixelSums sums;
+      for (int s = 0; s < pilot.spp; ++s) {
+        const auto sample =
+            static_cast<float>(value + (k % 2 == 0 ? bias : -bias) + noise * normal(engine));
+        sums.add({Rgb(sample, sample, sample), Rgb::Zero(), Rgb::Zero(), 1}, s);
+      }
+      sums.store(pilot.spp, k, frame);
+    }
+    pilot.frames.push_back(std::move(frame));
+    pilot.pixels += 64;
+  }
+  pilot.share_of_picture = 0.5;
+  pilot.seconds_per_spp = 0.1;
+  return pilot;
+}
+
+TEST(PlanFindings, APilotOfOneWayRaisesItsKindAndNoOther) {
+  const WaySettings exact{RenderMethod::kExact, {}};
+  const WaySettings volume{RenderMethod::kVolume, {}};
+  const WaySettings six{RenderMethod::kPath6, {}};
+  Findings findings(pilot_of(2, 0, 0.2, 1));
+  WayPrior prior;
+  prior.bias_square = {0.01, 0.005};
+  for (const WaySettings& way : {exact, volume, six}) findings.add_way(way, prior, "", 0, 1);
+  EXPECT_NEAR(findings.ways()[0].candidate.noise_square.value, 0.01, 0.001) << "relative";
+  EXPECT_EQ(findings.tried(), (std::vector<bool>{true, false, false, false}));
+
+  Pilot fast = pilot_of(2, 0.8, 0.02, 2);
+  fast.seconds_per_spp = 0.001;
+  findings.refine_mean(1, fast);
+  findings.add_trial(1, fast, false);
+  const std::vector<Way>& ways = findings.ways();
+  // The pilot says 0.16, the prior 0.01, and both may be wrong by a share of it.
+  EXPECT_GT(ways[1].candidate.bias_square.value, 0.05);
+  EXPECT_LT(ways[1].candidate.bias_square.value, 0.17);
+  EXPECT_NEAR(ways[2].candidate.bias_square.value, ways[1].candidate.bias_square.value, 1e-9);
+  EXPECT_EQ(ways[3].candidate.bias_square.value, 0.01);
+  EXPECT_NEAR(ways[1].candidate.noise_square.value, 0.0001, 0.00003);
+  EXPECT_EQ(ways[1].candidate.seconds_per_spp, 0.001);
+  EXPECT_EQ(findings.tried(), (std::vector<bool>{true, true, true, false}));
+  EXPECT_TRUE(findings.compared_with_these_paths(2));
+  EXPECT_FALSE(findings.compared_with_these_paths(3));
+}
+
+TEST(PlanFindings, APilotLowersOnlyWhereItMay) {
+  for (const bool may_lower : {false, true}) {
+    Findings findings(pilot_of(2, 0, 0.2, 1));
+    WayPrior prior;
+    prior.bias_square = {0.1, 0.05};
+    findings.add_way({RenderMethod::kExact, {}}, prior, "", 0, 1);
+    findings.add_trial(1, pilot_of(2, 0.2, 0.02, 2), may_lower);
+    const double square = findings.ways()[1].candidate.bias_square.value;
+    if (may_lower) {
+      EXPECT_LT(square, 0.09);
+      EXPECT_GT(square, 0.01) << "what was measured";
+    } else {
+      EXPECT_EQ(square, 0.1);
+    }
+  }
+}
+
+TEST(PlanFindings, LightBetweenClothsCountsWhereAWayLacksIt) {
+  Findings findings(pilot_of(2, 0, 0.02, 1));
+  WayPrior prior;
+  prior.bias_square = {0.01, 0.005};
+  findings.add_way({RenderMethod::kExact, {}}, prior, "", 0, 1);
+  findings.add_way({RenderMethod::kPath6, {}}, prior, "", 0, 1);
+  // A fifth of the light comes from other cloth.
+  findings.add_local_paths(pilot_of(1.6, 0, 0.02, 1), {});
+  EXPECT_NEAR(findings.ways()[1].candidate.bias_square.value, 0.01 + 0.2 * 0.2, 0.002);
+  EXPECT_EQ(findings.ways()[2].candidate.bias_square.value, 0.01);
+  EXPECT_EQ(findings.ways()[0].candidate.bias_square.value, 0);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "pipeline/plan/measure_accuracy.h"
+#include "pipeline/accuracy/measure_accuracy.h"
 
 #include <fmt/format.h>
 
@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "fibers/tracing/tile_scene.h"
-#include "pipeline/plan/enclosure.h"
+#include "pipeline/accuracy/enclosure.h"
 #include "pipeline/work_time.h"
 #include "render/cloth_scene.h"
 #include "render/path_tracer.h"
@@ -19,62 +19,6 @@ namespace heddle {
 namespace {
 
 constexpr int kLevels = 6;  // footprints of 1, 2, .. 2^(kLevels - 1) pixels
-
-constexpr double kSharpnesses[] = {3, 20, 150, 1000, kDirectionalSharpness};
-
-// The camera is so far away that its rays are parallel, as far as fibers can tell.
-constexpr double kCameraDistance = 500;  // mm
-// Beyond what is seen: further than light travels in cloth.
-constexpr double kMargin = 10;  // mm
-
-/// Angles from the cloth's normal and about it, degrees.
-struct ViewAndLight {
-  double view_theta, view_phi;
-  double light_theta, light_phi;
-};
-// Errors depend on how low the light stands more than on the view: as many pairs of low light as of
-// high.
-constexpr std::size_t kHeights = 2;
-constexpr std::size_t kPairsOfHeight = 4;
-constexpr ViewAndLight kPairs[kHeights * kPairsOfHeight] = {
-    {30, 290, 60, 300}, {20, 340, 58, 130}, {70, 260, 65, 80}, {45, 90, 62, 200},    // low light
-    {10, 20, 35, 80},   {40, 200, 20, 330}, {65, 150, 30, 20}, {50, 110, 40, 250}};  // high
-
-// Folds: a sine wave along x, slopes up to 35 degrees, unrolled without stretch. Of the size that
-// drapes have; steeper ones (55 degrees) are worse than drapes and cylinders are (silk under a
-// lamp: 90 % where a cylinder errs by 16).
-constexpr double kWaveLength = 40;   // mm
-constexpr double kWaveHeight = 4.5;  // mm, of its crests over the middle
-constexpr double kBentSeen = 48;     // mm across the picture
-constexpr double kBentSize = 160;    // mm
-constexpr ViewAndLight kBentPairs[] = {
-    {20, 60, 40, 190}, {45, 320, 55, 100}, {60, 130, 35, 20}, {40, 200, 65, 330}};
-
-Vec3d direction_of(double theta_deg, double phi_deg) {
-  const double theta = radians(theta_deg);
-  const double phi = radians(phi_deg);
-  return {std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta)};
-}
-
-double mean_cosine(std::span<const ViewAndLight> pairs) {
-  double sum = 0;
-  for (const ViewAndLight& pair : pairs) sum += std::cos(radians(pair.light_theta));
-  return sum / static_cast<double>(pairs.size());
-}
-
-ViewAndLight from_behind(ViewAndLight pair) {
-  pair.light_theta = 180 - pair.light_theta;
-  return pair;
-}
-
-Light light_of(double sharpness, const ViewAndLight& pair) {
-  Light light;
-  light.type =
-      sharpness >= kDirectionalSharpness ? LightType::kDirectional : LightType::kSphericalGaussian;
-  light.sharpness = static_cast<float>(sharpness);
-  light.axis = direction_of(pair.light_theta, pair.light_phi).cast<float>();
-  return light;
-}
 
 /// Sums over the pixels of a picture, at one footprint.
 struct Sums {
@@ -157,111 +101,6 @@ std::vector<Sums> compare(const FrameBuffers& frame, const FrameBuffers& referen
   return levels;
 }
 
-/// A sheet in folds, in the middle of the tile's copies.
-ClothMesh folded_cloth() {
-  constexpr int kAlong = 192;
-  constexpr int kAcross = 24;
-  ClothMesh mesh;
-  const double wave_number = 2 * kPi / kWaveLength;
-  const auto slope = [&](double x) {
-    return kWaveHeight * wave_number * std::cos(wave_number * x);
-  };
-  double length = 0;  // along the sheet
-  for (int i = 0; i <= kAlong; ++i) {
-    const double step = kBentSize / kAlong;
-    const double x = (static_cast<double>(i) / kAlong - 0.5) * kBentSize;
-    if (i > 0) length += step * std::hypot(1.0, slope(x - 0.5 * step));
-    for (int j = 0; j <= kAcross; ++j) {
-      const double y = (static_cast<double>(j) / kAcross - 0.5) * kBentSize;
-      mesh.positions.emplace_back(x, y, kWaveHeight * std::sin(wave_number * x));
-      mesh.normals.push_back(Vec3d(-slope(x), 0, 1).normalized());
-      mesh.fabric.emplace_back(length, y);
-    }
-  }
-  const auto vertex = [](int i, int j) {
-    return static_cast<std::uint32_t>(i * (kAcross + 1) + j);
-  };
-  for (int i = 0; i < kAlong; ++i) {
-    for (int j = 0; j < kAcross; ++j) {
-      mesh.triangles.push_back({vertex(i, j), vertex(i + 1, j), vertex(i + 1, j + 1)});
-      mesh.triangles.push_back({vertex(i, j), vertex(i + 1, j + 1), vertex(i, j + 1)});
-    }
-  }
-  return mesh;
-}
-
-class Swatch {
- public:
-  Swatch(const Exemplar& exemplar, std::uint64_t seed, const AccuracyEffort& effort)
-      : seed_(seed), effort_(effort) {
-    // As wide as the fibers, in the mean over segments.
-    double diameter = 0;
-    for (std::uint32_t segment = 0; segment < exemplar.segment_count(); ++segment) {
-      diameter += 2.0 * static_cast<double>(exemplar.radius_mm[exemplar.segment_fiber[segment]]);
-    }
-    pixel_mm_ = diameter / static_cast<double>(exemplar.segment_count());
-    const double size = 4 * (effort.pixels * pixel_mm_ + kMargin) +
-                        2 * std::max(exemplar.width_mm, exemplar.height_mm);
-    ClothConfig cloth;
-    cloth.flat_width_mm = size;
-    cloth.flat_height_mm = size;
-    config_.cloths = {cloth};
-    tile_mm_ = {exemplar.width_mm, exemplar.height_mm};
-  }
-
-  double pixel_mm() const { return pixel_mm_; }
-  std::uint64_t seed() const { return seed_; }
-  const AccuracyEffort& effort() const { return effort_; }
-
-  void use_fibers(const std::shared_ptr<const TileScene>& tile) {
-    config_.cloths[0].surface.reset();
-    flat_.reset(new ClothScene(make_cloth_scene(config_, std::span(&tile, 1))));
-    bent_ = std::make_unique<ClothScene>(std::vector<ClothPiece>{{tile, folded_cloth(), true}},
-                                         std::vector<TriangleMesh>{});
-  }
-  void use_surface(const SurfaceFabric& surface) {
-    config_.cloths[0].surface = surface;
-    flat_.reset(new ClothScene(make_cloth_scene(config_, {})));
-    std::vector<SurfaceCloth> surfaces;
-    surfaces.emplace_back(surface.model, folded_cloth());
-    bent_ = std::make_unique<ClothScene>(std::vector<ClothPiece>{}, std::vector<TriangleMesh>{},
-                                         std::move(surfaces));
-  }
-  const ClothScene& scene(bool bent) const { return bent ? *bent_ : *flat_; }
-
-  /// Each pair looks at another part of the tile.
-  Camera camera(std::size_t pair) const {
-    const auto index = static_cast<double>(pair);
-    return square_camera(kPairs[pair],
-                         {index * 0.754877 * tile_mm_[0], index * 0.569840 * tile_mm_[1], 0},
-                         effort_.pixels * pixel_mm_, effort_.pixels);
-  }
-  static Camera bent_camera(std::size_t pair, int pixels) {
-    return square_camera(kBentPairs[pair], {0, 0, 0}, kBentSeen, pixels);
-  }
-
- private:
-  static Camera square_camera(const ViewAndLight& pair, const Vec3d& place, double width_mm,
-                              int pixels) {
-    CameraConfig camera;
-    camera.look_at = place;
-    camera.position = place + kCameraDistance * direction_of(pair.view_theta, pair.view_phi);
-    camera.up = Vec3d(0.3, 1, 0);
-    camera.fov = 2 * std::atan(0.5 * width_mm / kCameraDistance);
-    camera.fov_axis = FovAxis::kHorizontal;
-    camera.width = camera.height = pixels;
-    return Camera(camera);
-  }
-
-  std::uint64_t seed_;
-  AccuracyEffort effort_;
-  SceneConfig config_;
-  std::array<double, 2> tile_mm_{};
-  double pixel_mm_ = 0;
-  std::unique_ptr<ClothScene> flat_;
-  std::unique_ptr<ClothScene> bent_;
-};
-
 /// Mean over the pixels; cloth fills the picture.
 double mean_square_enclosure(const Camera& camera, const ClothScene& scene) {
   double sum = 0;
@@ -280,12 +119,12 @@ double mean_square_enclosure(const Camera& camera, const ClothScene& scene) {
 }
 
 /// A picture of a view under lights, and what it took.
-struct Shot {
+struct TimedFrame {
   FrameBuffers frame;
   double setup_seconds = 0;
   double seconds = 0;
 };
-using Shoot = std::function<Shot(const Camera&, const std::vector<Light>&, bool bent)>;
+using RenderSwatch = std::function<TimedFrame(const Camera&, const std::vector<Light>&, bool bent)>;
 
 class TableMaker {
  public:
@@ -305,24 +144,24 @@ class TableMaker {
 
   /// The first setting, "path", is the reference of all. `change_of`: the setting, added before,
   /// that this one is a change of, or none.
-  void add(const std::string& name, const Shoot& shoot, const std::string& change_of = "") {
+  void add(const std::string& name, const RenderSwatch& render, const std::string& change_of = "") {
     SettingAccuracy setting;
     setting.name = name;
     double samples = 0;
-    std::size_t shots = 0;
+    std::size_t pictures = 0;
     std::vector<FrameBuffers>& own = frames_[name];
     const std::vector<FrameBuffers>& unchanged = change_of.empty() ? own : frames_.at(change_of);
     const auto compare_with = [&](std::size_t picture, const Camera& camera, const Light& light,
                                   bool bent, int levels) {
-      (*progress_)((static_cast<double>(done_) + static_cast<double>(shots) / kShots) /
+      (*progress_)((static_cast<double>(done_) + static_cast<double>(pictures) / kShots) /
                    static_cast<double>(steps_));
-      const Shot shot = shoot(camera, {light}, bent);
-      own.push_back(shot.frame);
-      setting.setup_seconds += shot.setup_seconds;
-      setting.seconds_per_sample += shot.seconds;
-      samples += static_cast<double>(shot.frame.pixel_count()) * shot.frame.spp;
-      ++shots;
-      return compare(shot.frame, reference()[picture], unchanged[picture], levels);
+      const TimedFrame timed = render(camera, {light}, bent);
+      own.push_back(timed.frame);
+      setting.setup_seconds += timed.setup_seconds;
+      setting.seconds_per_sample += timed.seconds;
+      samples += static_cast<double>(timed.frame.pixel_count()) * timed.frame.spp;
+      ++pictures;
+      return compare(timed.frame, reference()[picture], unchanged[picture], levels);
     };
     std::size_t picture = 0;
     for (const double sharpness : kSharpnesses) {
@@ -346,21 +185,21 @@ class TableMaker {
       }
       setting.bent.push_back(accuracy_of(bent));
     }
-    setting.setup_seconds /= static_cast<double>(shots);
+    setting.setup_seconds /= static_cast<double>(pictures);
     setting.seconds_per_sample /= samples;
     table_.settings.push_back(std::move(setting));
     ++done_;
   }
 
-  /// Light from fold to fold, which the reference lacks: `shoot` does not. After the reference.
-  void add_between(const Shoot& shoot) {
+  /// Light from fold to fold, which the reference lacks: `render` does not. After the reference.
+  void add_between(const RenderSwatch& render) {
     std::size_t picture = 0;
     for (const double sharpness : kSharpnesses) {
       picture += std::size(kPairs);
       std::vector<Sums> bent;
       for (std::size_t pair = 0; pair < std::size(kBentPairs); ++pair, ++picture) {
-        const FrameBuffers all = shoot(Swatch::bent_camera(pair, swatch_->effort().bent_pixels),
-                                       {light_of(sharpness, kBentPairs[pair])}, true)
+        const FrameBuffers all = render(Swatch::bent_camera(pair, swatch_->effort().bent_pixels),
+                                        {light_of(sharpness, kBentPairs[pair])}, true)
                                      .frame;
         bent.push_back(compare(reference()[picture], all, all, 1)[0]);
       }
@@ -376,14 +215,14 @@ class TableMaker {
 
   /// Colour of the cloth, and what shines through it: directional light from the face, and from
   /// behind. After the reference.
-  void add_through(const Shoot& shoot) {
+  void add_through(const RenderSwatch& render) {
     Rgbd front = Rgbd::Zero();
     Rgbd behind = Rgbd::Zero();
     const std::size_t first = reference().size() - std::size(kPairs) - std::size(kBentPairs);
     for (std::size_t pair = 0; pair < std::size(kPairs); ++pair) {
       const Light light = light_of(kDirectionalSharpness, from_behind(kPairs[pair]));
       front += sum_of(reference()[first + pair]);
-      behind += sum_of(shoot(swatch_->camera(pair), {light}, false).frame);
+      behind += sum_of(render(swatch_->camera(pair), {light}, false).frame);
     }
     if (!(front.mean() > 0)) return;  // black cloth
     table_.color = front / front.mean();
@@ -445,7 +284,7 @@ class TableMaker {
 const RenderProgress kSilent = [](double) {};
 
 /// `local`: without light from fold to fold, which the precomputed methods do not claim to compute.
-Shoot paths(const Swatch& swatch, int flat_samples, int max_scatterings, bool local = true) {
+RenderSwatch paths(const Swatch& swatch, int flat_samples, int max_scatterings, bool local = true) {
   return [&swatch, flat_samples, max_scatterings, local](
              const Camera& camera, const std::vector<Light>& lights, bool bent) {
     const int samples = flat_samples * (bent ? swatch.effort().bent_factor : 1);
@@ -453,34 +292,34 @@ Shoot paths(const Swatch& swatch, int flat_samples, int max_scatterings, bool lo
     settings.seed = swatch.seed();
     settings.local = bent && local;
     if (max_scatterings > 0) settings.limits.max_scatterings = max_scatterings;
-    Shot shot;
+    TimedFrame timed;
     const Stopwatch setup;
     const std::vector<BcsdfTable> materials = scene_materials(swatch.scene(bent));
     const PathTracer tracer(swatch.scene(bent), materials, lights, Rgb(0, 0, 0), settings);
-    shot.setup_seconds = setup.elapsed().seconds;
+    timed.setup_seconds = setup.elapsed().seconds;
     const Stopwatch watch;
-    shot.frame =
+    timed.frame =
         trace_picture(tracer, camera, camera.full_frame(), settings.seed, {samples, {}}, kSilent);
-    shot.seconds = watch.elapsed().seconds;
-    return shot;
+    timed.seconds = watch.elapsed().seconds;
+    return timed;
   };
 }
 
-Shoot precomputed(const Swatch& swatch, const FabricPack& pack,
-                  const PrecomputedSettings& settings) {
+RenderSwatch precomputed(const Swatch& swatch, const FabricPack& pack,
+                         const PrecomputedSettings& settings) {
   return [&swatch, &pack, settings](const Camera& camera, const std::vector<Light>& lights,
                                     bool bent) {
-    Shot shot;
+    TimedFrame timed;
     const FabricPack* packs[] = {&pack};
     const Stopwatch setup;
     const PrecomputedRenderer renderer(swatch.scene(bent), packs, lights, Rgb(0, 0, 0), settings);
-    shot.setup_seconds = setup.elapsed().seconds;
+    timed.setup_seconds = setup.elapsed().seconds;
     const Stopwatch watch;
-    shot.frame = shade_picture(
+    timed.frame = shade_picture(
         renderer, camera, camera.full_frame(),
         swatch.effort().method_samples * (bent ? swatch.effort().bent_factor : 1), kSilent);
-    shot.seconds = watch.elapsed().seconds;
-    return shot;
+    timed.seconds = watch.elapsed().seconds;
+    return timed;
   };
 }
 

@@ -1,10 +1,10 @@
-#ifndef HEDDLE_PIPELINE_PLAN_ACCURACY_TABLE_H_
-#define HEDDLE_PIPELINE_PLAN_ACCURACY_TABLE_H_
+#ifndef HEDDLE_PIPELINE_ACCURACY_ACCURACY_TABLE_H_
+#define HEDDLE_PIPELINE_ACCURACY_ACCURACY_TABLE_H_
 // What the methods are worth on one fabric, measured on a flat and on a folded swatch of it
 // (measure_accuracy.h): for lights of several sharpnesses and pixels of several footprints, each
 // setting's error apart from noise, its noise and its speed; and what its data took to build. A
 // small JSON file, the artifact of the stage `accuracy`; the planner reads it before anything else
-// is built. Errors: FileError. Tested in tests/pipeline/plan_test.cpp.
+// is built. Errors: FileError. Tested in tests/pipeline/accuracy_test.cpp.
 
 #include <compare>
 #include <filesystem>
@@ -95,4 +95,4 @@ std::string accuracy_text(const AccuracyTable& table);
 
 }  // namespace heddle
 
-#endif  // HEDDLE_PIPELINE_PLAN_ACCURACY_TABLE_H_
+#endif  // HEDDLE_PIPELINE_ACCURACY_ACCURACY_TABLE_H_

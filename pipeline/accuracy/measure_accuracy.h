@@ -1,5 +1,5 @@
-#ifndef HEDDLE_PIPELINE_PLAN_MEASURE_ACCURACY_H_
-#define HEDDLE_PIPELINE_PLAN_MEASURE_ACCURACY_H_
+#ifndef HEDDLE_PIPELINE_ACCURACY_MEASURE_ACCURACY_H_
+#define HEDDLE_PIPELINE_ACCURACY_MEASURE_ACCURACY_H_
 // Fills an accuracy table: every setting against path tracing on a flat swatch of the fabric, and
 // on one that lies in folds over black, by the renderers' own code.
 //
@@ -22,7 +22,7 @@
 //   voxels x F                                volume with larger voxels (FabricVariant::voxel_rate)
 //   signed distance, Gaussians                exact with one form of visibility for all spherical
 //                                             Gaussians
-// Tested in tests/pipeline/plan_test.cpp.
+// Tested in tests/pipeline/accuracy_test.cpp.
 
 #include <functional>
 #include <map>
@@ -31,8 +31,8 @@
 #include <vector>
 
 #include "fibers/baked/fabric_pack.h"
-#include "pipeline/plan/accuracy_table.h"
-#include "render/scene_config.h"
+#include "pipeline/accuracy/accuracy_table.h"
+#include "pipeline/accuracy/swatch.h"
 
 namespace heddle {
 
@@ -56,15 +56,6 @@ struct AccuracyData {
   std::map<double, IdVolume> voxels;  // by factor
 };
 
-/// How much is measured; less is for tests.
-struct AccuracyEffort {
-  int pixels = 32;        // along an edge of a flat picture, a power of two of at least 32
-  int bent_pixels = 12;   // of a folded one
-  int path_samples = 32;  // per pixel, flat; `bent_factor` times as many in folds; even
-  int method_samples = 8;
-  int bent_factor = 16;
-};
-
 /// Called with the share done, 0 .. 1; may throw to stop.
 using AccuracyProgress = std::function<void(double)>;
 
@@ -80,4 +71,4 @@ AccuracyTable measure_surface_accuracy(const Exemplar& exemplar, const SurfaceFa
 
 }  // namespace heddle
 
-#endif  // HEDDLE_PIPELINE_PLAN_MEASURE_ACCURACY_H_
+#endif  // HEDDLE_PIPELINE_ACCURACY_MEASURE_ACCURACY_H_

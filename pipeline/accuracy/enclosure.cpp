@@ -1,4 +1,4 @@
-#include "pipeline/plan/enclosure.h"
+#include "pipeline/accuracy/enclosure.h"
 
 #include <cmath>
 

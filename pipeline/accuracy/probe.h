@@ -1,5 +1,5 @@
-#ifndef HEDDLE_PIPELINE_PLAN_PROBE_H_
-#define HEDDLE_PIPELINE_PLAN_PROBE_H_
+#ifndef HEDDLE_PIPELINE_ACCURACY_PROBE_H_
+#define HEDDLE_PIPELINE_ACCURACY_PROBE_H_
 // What a few samples of a picture, or of parts of it, say of its noise and of its error. A picture
 // is given in blocks of pixels with two halves of samples each (FrameBuffers::half0, half1).
 // Pictures of one seed share their eye rays, sample by sample: the noise that comes from those
@@ -8,7 +8,7 @@
 //   bias^2 = mean (F0 - R0)(F1 - R1)      F: a method, R: path tracing
 //
 // Standard errors come from the spread between blocks. Values are colour channels of pixels;
-// "relative" is relative to the mean radiance, squared. Tested in tests/pipeline/plan_test.cpp.
+// "relative" is relative to the mean radiance, squared. Tested in tests/pipeline/accuracy_test.cpp.
 
 #include <span>
 #include <vector>
@@ -49,4 +49,4 @@ Estimate squared_bias(std::span<const FrameBuffers> blocks,
 
 }  // namespace heddle
 
-#endif  // HEDDLE_PIPELINE_PLAN_PROBE_H_
+#endif  // HEDDLE_PIPELINE_ACCURACY_PROBE_H_

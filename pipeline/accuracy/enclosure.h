@@ -1,10 +1,10 @@
-#ifndef HEDDLE_PIPELINE_PLAN_ENCLOSURE_H_
-#define HEDDLE_PIPELINE_PLAN_ENCLOSURE_H_
+#ifndef HEDDLE_PIPELINE_ACCURACY_ENCLOSURE_H_
+#define HEDDLE_PIPELINE_ACCURACY_ENCLOSURE_H_
 // How much of what surrounds a place on cloth is cloth again: the share of a cosine-weighted
 // hemisphere, over the side that is seen, that shells and meshes cover. Light from there is what
 // methods lack that end it where it leaves a cloth; that light goes with the share, its square with
 // the share's. Geometry alone: a few rays tell it where as many paths would say nothing. Tested in
-// tests/pipeline/plan_test.cpp.
+// tests/pipeline/accuracy_test.cpp.
 
 #include "render/cloth_scene.h"
 
@@ -15,4 +15,4 @@ double enclosure(const ClothScene& scene, const ShellHit& hit, const Vec3& direc
 
 }  // namespace heddle
 
-#endif  // HEDDLE_PIPELINE_PLAN_ENCLOSURE_H_
+#endif  // HEDDLE_PIPELINE_ACCURACY_ENCLOSURE_H_

@@ -1,4 +1,4 @@
-#include "pipeline/plan/probe.h"
+#include "pipeline/accuracy/probe.h"
 
 #include <algorithm>
 #include <cassert>

@@ -1,4 +1,4 @@
-#include "pipeline/plan/accuracy_table.h"
+#include "pipeline/accuracy/accuracy_table.h"
 
 #include <fmt/format.h>
 
