@@ -161,10 +161,22 @@ const char* kept_after_signal(const std::string& command) {
   return kept.at(command);
 }
 
-/// Declares all subcommands and returns what each of them does.
-std::map<std::string, std::function<int()>> add_commands(CLI::App& app, Options& options) {
-  std::map<std::string, std::function<int()>> actions;
+void add_view(CLI::App& command, std::string& view) {
+  command.add_option("--view", view,
+                     "Name of one of the scene's [[view]] tables; its [camera] by default");
+}
 
+/// crop: x0, y0, x1, y1.
+void add_crop(CLI::App& command, std::vector<int>& crop) {
+  command.add_option("--crop,--cropwindow", crop, "x0,y0,x1,y1 in pixels, x1 and y1 excluded")
+      ->delimiter(',')
+      ->expected(4);
+}
+
+/// What each command does, by its name.
+using Actions = std::map<std::string, std::function<int()>>;
+
+void add_run(CLI::App& app, Options& options, Actions& actions) {
   CLI::App* run = app.add_subcommand(
       "run", "Build everything that a scene lacks, then render its pictures: the main job");
   add_building(*run, options);
@@ -174,7 +186,10 @@ std::map<std::string, std::function<int()>> add_commands(CLI::App& app, Options&
                   "Folder of the pictures; out/NAME by default");
   add_order(*run, options.run.order);
   actions["run"] = [&options] { return run_command(options.run, options.common); };
+}
 
+/// One command for each stage, and for all up to the pack.
+void add_stages(CLI::App& app, Options& options, Actions& actions) {
   add_stage_command(app, options, "precompute", "All stages of a fabric up to its pack",
                     StageTarget::kPack, false);
   add_stage_command(app, options, "synth", "Fibers of a fabric", StageTarget::kSynth, false);
@@ -193,7 +208,9 @@ std::map<std::string, std::function<int()>> add_commands(CLI::App& app, Options&
       return stage_command(options.stage, options.common);
     };
   }
+}
 
+void add_render(CLI::App& app, Options& options, Actions& actions) {
   CLI::App* render = app.add_subcommand("render", "One picture of a scene");
   RenderOptions& picture = options.render;
   add_building(*render, options);
@@ -203,18 +220,14 @@ std::map<std::string, std::function<int()>> add_commands(CLI::App& app, Options&
       ->add_option("-o,--output,--outfile", picture.output,
                    "The .exr file; a .png and a .json go beside it")
       ->required();
-  render->add_option("--view", picture.view,
-                     "Name of one of the scene's [[view]] tables; its [camera] by default");
+  add_view(*render, picture.view);
   render->add_option("--method", picture.method, "In place of the scene's")
       ->check(CLI::IsMember(method_names()));
   render->add_option("--spp", picture.spp, "Samples per pixel, in place of the scene's")
       ->check(CLI::Range(1, 1 << 24));
   render->add_option("--seconds", picture.seconds, "Path tracer: render for this many seconds")
       ->check(CLI::PositiveNumber);
-  render
-      ->add_option("--crop,--cropwindow", picture.crop, "x0,y0,x1,y1 in pixels, x1 and y1 excluded")
-      ->delimiter(',')
-      ->expected(4);
+  add_crop(*render, picture.crop);
   render->add_flag("--local", picture.local, "Path tracer: paths that leave the cloth's shell end");
   render
       ->add_option("--bounces", picture.bounces,
@@ -228,12 +241,16 @@ std::map<std::string, std::function<int()>> add_commands(CLI::App& app, Options&
       "Largest relative RMSE per pixel, noise included; a plan chooses method, samples and data",
       picture.tolerance);
   actions["render"] = [&options] { return render_command(options.render, options.common); };
+}
 
+void add_eval(CLI::App& app, Actions& actions) {
   CLI::App* evaluate = app.add_subcommand(
       "eval", "JSON lines in, JSON lines out: any scattering model or basis function");
   evaluate->footer("Quantities and their fields: docs/eval.md");
   actions["eval"] = [] { return run_eval(std::cin, std::cout); };
+}
 
+void add_compare(CLI::App& app, Options& options, Actions& actions) {
   CLI::App* compare =
       app.add_subcommand("compare", "Error metrics of picture A against the reference B");
   CompareOptions& pair = options.compare;
@@ -252,7 +269,9 @@ std::map<std::string, std::function<int()>> add_commands(CLI::App& app, Options&
                    "Exit with status 1 if the mean colour is off by a larger share")
       ->check(CLI::NonNegativeNumber);
   actions["compare"] = [&options] { return compare_command(options.compare, options.common); };
+}
 
+void add_plan(CLI::App& app, Options& options, Actions& actions) {
   CLI::App* plan =
       app.add_subcommand("plan", "The cheapest way to a picture that is good enough, and why");
   add_building(*plan, options);
@@ -262,14 +281,12 @@ std::map<std::string, std::function<int()>> add_commands(CLI::App& app, Options&
                 "Largest relative RMSE per pixel, noise included: 0.05 is 5 %",
                 options.plan.tolerance)
       ->required();
-  plan->add_option("--view", options.plan.view,
-                   "Name of one of the scene's [[view]] tables; its [camera] by default");
-  plan->add_option("--crop,--cropwindow", options.plan.crop,
-                   "x0,y0,x1,y1 in pixels, x1 and y1 excluded")
-      ->delimiter(',')
-      ->expected(4);
+  add_view(*plan, options.plan.view);
+  add_crop(*plan, options.plan.crop);
   actions["plan"] = [&options] { return plan_command(options.plan, options.common); };
+}
 
+void add_chart(CLI::App& app, Options& options, Actions& actions) {
   CLI::App* chart =
       app.add_subcommand("chart", "Speed against accuracy, over the methods and their settings");
   ChartOptions& asked = options.chart;
@@ -277,17 +294,14 @@ std::map<std::string, std::function<int()>> add_commands(CLI::App& app, Options&
   add_picture_seed(*chart, options);
   chart->add_option("SCENE.toml", asked.scene, "Scene config")->required();
   chart->add_option("-o,--output,--outfile", asked.output, "Folder of the chart")->required();
-  chart->add_option("--view", asked.view,
-                    "Name of one of the scene's [[view]] tables; its [camera] by default");
+  add_view(*chart, asked.view);
   chart
       ->add_option("--width", asked.width,
                    "Pixels; 96 if neither width nor height nor crop is given")
       ->check(CLI::Range(1, 16384));
   chart->add_option("--height", asked.height, "Pixels; by default from the view's shape")
       ->check(CLI::Range(1, 16384));
-  chart->add_option("--crop,--cropwindow", asked.crop, "x0,y0,x1,y1 in pixels, x1 and y1 excluded")
-      ->delimiter(',')
-      ->expected(4);
+  add_crop(*chart, asked.crop);
   chart
       ->add_option("--reference-spp", asked.reference_spp,
                    "Samples per pixel of the two references, by default 1024")
@@ -302,7 +316,9 @@ std::map<std::string, std::function<int()>> add_commands(CLI::App& app, Options&
   chart->add_flag("--resume", asked.resume,
                   "Keep what an earlier chart in the same folder has rendered and timed");
   actions["chart"] = [&options] { return chart_command(options.chart, options.common); };
+}
 
+void add_info(CLI::App& app, Options& options, Actions& actions) {
   CLI::App* info =
       app.add_subcommand("info", "What a file holds: any of ours, or any that we read");
   add_common(*info, options);
@@ -313,12 +329,28 @@ std::map<std::string, std::function<int()>> add_commands(CLI::App& app, Options&
           "our .json files")
       ->required();
   actions["info"] = [&options] { return info_command(options.path, options.common); };
+}
 
+void add_check(CLI::App& app, Options& options, Actions& actions) {
   CLI::App* check =
       app.add_subcommand("check", "Checksums, versions, finite values and ranges of a pack");
   add_common(*check, options);
   check->add_option("PACK", options.path, "Folder with a manifest.json")->required();
   actions["check"] = [&options] { return check_command(options.path, options.common); };
+}
+
+/// Declares all subcommands.
+Actions add_commands(CLI::App& app, Options& options) {
+  Actions actions;
+  add_run(app, options, actions);
+  add_stages(app, options, actions);
+  add_render(app, options, actions);
+  add_eval(app, actions);
+  add_compare(app, options, actions);
+  add_plan(app, options, actions);
+  add_chart(app, options, actions);
+  add_info(app, options, actions);
+  add_check(app, options, actions);
   return actions;
 }
 
@@ -327,7 +359,7 @@ int main_program(int argc, char** argv) {
   app.set_version_flag("--version", std::string("heddle ") + kProgramVersion);
   app.require_subcommand(1);
   Options options;
-  const auto actions = add_commands(app, options);
+  const Actions actions = add_commands(app, options);
   if (argc > 1 && argv[1][0] != '-' && !actions.contains(argv[1])) {
     std::string known;
     for (const auto& [name, action] : actions) known += " " + name;
