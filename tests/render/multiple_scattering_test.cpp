@@ -193,8 +193,10 @@ double norm_above(const Harmonics& c) {
 }
 
 // What the projection weighs directions by, sum_j c_j Y_j, against that of the moments by
-// quadrature. The table's moments are good to 2e-3 of the largest; the dual, whose eigenvalues are
-// at most 1 / 0.05, makes up to 1 / sqrt(0.05) times as much of it.
+// quadrature. Lights wholly above the horizon are projected to half a per cent. Of those that it
+// cuts, the table takes 64 x 64 points, of which some lie on the wrong side: moments are off by up
+// to 6e-3 of their norm, and the dual, whose eigenvalues are at most 1 / 0.05, makes up to
+// 1 / sqrt(0.05) = 4.5 times as much of it.
 TEST(MultipleScatteringAgreement, FaceLightIsTheProjectionOfItsMomentsAboveTheHorizon) {
   double worst = 0;
   for (const float sharpness : {0.0F, 2.0F, 30.0F, 150.0F}) {
@@ -227,7 +229,8 @@ TEST(MultipleScatteringAgreement, FaceLightIsTheProjectionOfItsMomentsAboveTheHo
           dual.cast<double>();
       const double error = norm_above(difference) / norm_above(dual.cast<double>());
       worst = std::max(worst, error);
-      EXPECT_LT(error, 0.01) << sharpness << ", axis " << unit.transpose();
+      const bool is_cut = sharpness < 30 || unit.z() < 0.5F;
+      EXPECT_LT(error, is_cut ? 0.03 : 0.005) << sharpness << ", axis " << unit.transpose();
     }
   }
   std::printf("  largest error of the projection: %.4f of its norm\n", worst);
