@@ -13,8 +13,8 @@
 namespace heddle {
 
 Mat3 wo_space(const Vec3& tangent, const Vec3& wo) {
-  // Below this length of wo's part across the tangent, its direction is rounding error; so is the
-  // choice of y then, since the BCSDF at theta_o = 90 degrees does not depend on it.
+  // Below this length of wo's part across the tangent, its direction is rounding error. Then any y
+  // will do, since the BCSDF at theta_o = 90 degrees does not depend on it.
   constexpr float kAlong = 1e-5F;
   const Vec3 across = wo - wo.dot(tangent) * tangent;
   const float length = across.norm();

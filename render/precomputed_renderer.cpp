@@ -15,8 +15,8 @@
 namespace heddle {
 namespace {
 
-/// A block is this many pixels wide and high, and takes this many samples at a time: 2048 samples
-/// fill a G-buffer of some 300 KB, and give a close-up enough samples per cell to sort.
+/// A block is this many pixels wide and high, and takes this many samples at a time. 2048 samples
+/// fill a G-buffer of 400 KB, and give a close-up enough samples per cell to sort.
 constexpr int kBlockEdge = 16;
 constexpr int kBlockSamples = 8;
 

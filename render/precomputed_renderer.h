@@ -93,9 +93,8 @@ class PrecomputedRenderer {
   LightVisibilityPass visibility_pass_;
 };
 
-/// Beauty, single, multiple, alpha, G-buffer of the first sample; with 2 samples or more also half0
-/// (even samples), half1 (odd samples) and the variance of the pixel's mean; `more` may be given
-/// with those only.
+/// Beauty, single, multiple, alpha, G-buffer of the first sample. With 2 samples or more also half0
+/// (even samples), half1 (odd samples) and the variance of the pixel's mean. `more` needs these.
 FrameBuffers shade_picture(const PrecomputedRenderer& renderer, const Camera& camera,
                            const PixelRect& crop, int spp, const RenderProgress& progress,
                            const MoreSamples& more = {});

@@ -238,7 +238,7 @@ Vec3d Shell::weights_in(std::uint32_t triangle, const Eigen::Vector2d& p) const 
 
 std::optional<std::uint32_t> Shell::find_triangle(std::uint32_t triangle,
                                                   const Eigen::Vector2d& fabric_xy) const {
-  // Each step crosses the edge that the point lies furthest behind, so the walk is short; folded
+  // Each step crosses the edge that the point lies furthest behind, so the walk is short. Folded
   // UVs could make it circle, so it is capped.
   constexpr int kMaxSteps = 4096;
   for (int step = 0; step < kMaxSteps && triangle != kNone; ++step) {

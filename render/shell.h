@@ -1,19 +1,19 @@
 #ifndef HEDDLE_RENDER_SHELL_H_
 #define HEDDLE_RENDER_SHELL_H_
-// The shell map: a cloth surface with UVs thickened along its vertex normals into tetrahedra, each
-// with an affine map between world space and fabric space (Porumbescu et al. 2005; Khungurn 2017,
-// section 5.1). The surface is the fabric's plane z = 0. World and fabric millimetres, in double: a
-// fiber is 1e-5 of a drape.
+// The shell map: a cloth surface with UVs, thickened along its vertex normals into tetrahedra. Each
+// has an affine map between world space and fabric space (Porumbescu et al. 2005; Khungurn 2017,
+// section 5.1). The surface is the fabric's plane z = 0. World and fabric are in millimetres, in
+// double: a fiber is 1e-5 of a drape.
 //
-// Every triangle's prism is cut into 3 tetrahedra whose diagonals run from the bottom of the lower
-// vertex index to the top of the higher one, so that neighbours agree. Triangle t owns tetrahedra 3
-// t, 3 t + 1, 3 t
-// + 2. Vertex v of the surface becomes 2 v (bottom) and 2 v + 1 (top).
+// Every triangle's prism is cut into 3 tetrahedra. Their diagonals run from the bottom of the lower
+// vertex index to the top of the higher one, so that neighbours agree. Triangle t owns the
+// tetrahedra 3 t, 3 t + 1 and 3 t + 2. Vertex v of the surface becomes 2 v (bottom) and 2 v + 1
+// (top).
 //
-// A ray walks from tetrahedron to tetrahedron. In the plane across the ray, the face it leaves by
-// is decided by the signs of cross products that are computed once per edge, up to their sign; so
-// the walk has no gaps, and as every step can be undone it cannot loop. Through a flipped
-// tetrahedron the walk goes backwards along the ray: nothing is visible there. Tested in
+// A ray walks from tetrahedron to tetrahedron. In the plane across the ray, signs of cross products
+// decide by which face it leaves. They are computed once per edge, up to their sign, so the walk
+// has no gaps. Every step can be undone, so it cannot loop. Through a flipped tetrahedron the walk
+// goes backwards along the ray, and nothing is visible there. Tested in
 // tests/render/shell_test.cpp.
 
 #include <array>

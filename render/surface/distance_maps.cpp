@@ -75,8 +75,8 @@ DistanceMaps::DistanceMaps(std::span<const Mat3> frames, const Visible& visible,
     if (vertex_done) vertex_done();
   });
 
-  // Components over the vertices, cells weighted by solid angle; below the horizon, where only the
-  // far ends of Gaussians are evaluated, by a tenth of it.
+  // Components over the vertices, with cells weighted by solid angle. Below the horizon only the
+  // far ends of Gaussians are evaluated, so cells there count a tenth.
   Eigen::RowVectorXf weight(cells);
   double whole = 0;
   for (int row = 0, k = 0; row < resolution_; ++row) {

@@ -1,22 +1,22 @@
 #ifndef HEDDLE_RENDER_SURFACE_INTERACTIVE_MICROCYLINDER_H_
 #define HEDDLE_RENDER_SURFACE_INTERACTIVE_MICROCYLINDER_H_
 // The microcylinder model under spherical Gaussian lights with shadows, fast enough to turn a
-// camera: Iwasaki, Mizutani, Dobashi and Nishita 2014, "Interactive cloth rendering of
+// camera. Iwasaki, Mizutani, Dobashi and Nishita 2014, "Interactive cloth rendering of
 // microcylinder appearance model under environment lighting".
 //
 // Radiance = sum over lights and tangents of (averaged weights) * (smooth factors) * (two circular
-// Gaussians clipped by the border of what is visible): the light's Gaussian is one in theta and one
-// in phi of the thread (eq. 11), a lobe of the thread is one in theta, and their product is
-// integrated on the visible side of a line (clipped_gaussians). Weights come from a WeightingTable,
-// the line from DistanceMaps; neither knows the threads' colours, indices and widths, so those can
-// be edited at once.
+// Gaussians clipped by the border of what is visible). The light's Gaussian is one in theta and one
+// in phi of the thread (eq. 11). A lobe of the thread is one in theta. Their product is integrated
+// on the visible side of a line (clipped_gaussians). Weights come from a WeightingTable, the line
+// from DistanceMaps. Neither depends on the threads' colours, indices and widths, so those can be
+// edited at once.
 //
 // `printed` computes everything as in the paper: smooth factors at the means (theta_l, phi_k),
-// weights averaged over the light (eq. 9), eq. 13 times the logistic function of eq. 14. Otherwise
-// smooth factors are averaged over the Gaussians, weights are those around the product of light and
-// lobe, the clipped integral is exact, and a tangent that stands for a piece of a curve has its
-// lobes widened by that piece. Errors of both: docs/surface-models.md. Shading is thread-safe.
-// Tested in tests/render/surface/interactive_microcylinder_test.cpp.
+// weights averaged over the light (eq. 9), and eq. 13 times the logistic function of eq. 14.
+// Otherwise smooth factors are averaged over the Gaussians, weights are those around the product of
+// light and lobe, and the clipped integral is exact. A tangent that stands for a piece of a curve
+// then has its lobes widened by that piece. Errors of both: docs/surface-models.md. Shading is
+// thread-safe. Tested in tests/render/surface/interactive_microcylinder_test.cpp.
 
 #include <array>
 #include <functional>

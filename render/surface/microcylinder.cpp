@@ -69,8 +69,8 @@ class Panels {
     ends_[count_++] = at;
   }
 
-  /// Ends about `centre` at distances reach, reach / 3, ... down to scale: what varies over a
-  /// distance that shrinks towards a point close to the integration path.
+  /// Ends about `centre` at distances reach, reach / 3, ... down to scale. For functions that vary
+  /// over a distance that shrinks towards a point close to the integration path.
   void add_graded(double centre, double scale, double reach) {
     for (double distance = reach; distance > scale; distance /= 3)
       add(centre - distance), add(centre + distance);
@@ -263,11 +263,11 @@ CurveMeans Microcylinder::Thread::means(const Vec3d& wi, const Vec3d& wo, int re
   return sum;
 }
 
-/// min(1, (n . wi) / E(wi)) with E = integral over wo of R(wi, wo) (n . wo), the largest channel:
-/// directional albedo times n . wi, which stays finite towards the horizon. Bilinear in a table
-/// over elevation and azimuth. Near the horizon E changes within a few degrees of a thread's
-/// direction, where columns are close; on that direction itself it has a narrow minimum, which no
-/// column may meet.
+/// min(1, (n . wi) / E(wi)) with E = integral over wo of R(wi, wo) (n . wo), in the largest
+/// channel. E is directional albedo times n . wi, which stays finite towards the horizon. Bilinear
+/// in a table over elevation and azimuth. Near the horizon E changes within a few degrees of a
+/// thread's direction, where columns are close. On that direction itself it has a narrow minimum,
+/// which no column may meet.
 class Microcylinder::EnergyTable {
  public:
   explicit EnergyTable(const Microcylinder& fabric) : table_(kRows * kColumns) {
@@ -383,9 +383,9 @@ Rgbd Microcylinder::directional_albedo(const Vec3d& wi) const {
 
 Rgbd Microcylinder::reflected_sg(const SurfacePoint& point, const Vec3d& axis, double sharpness,
                                  const Vec3d& wo) const {
-  // Polar coordinates about the axis: s^2 is the light's share nearer to the axis, and at each
-  // distance only the arc above the horizon is covered. Frame: `up` is the direction across the
-  // axis that climbs most.
+  // Polar coordinates about the axis. s^2 is the light's share nearer to the axis. At each distance
+  // only the arc above the horizon is covered. Frame: `up` is the direction across the axis that
+  // climbs most.
   const double sine = std::hypot(axis.x(), axis.y());
   const double elevation = std::atan2(axis.z(), sine);
   const Vec3d up = sine > 1e-12 ? Vec3d((Vec3d(0, 0, 1) - axis.z() * axis) / sine) : Vec3d(1, 0, 0);

@@ -1,20 +1,20 @@
 #ifndef HEDDLE_RENDER_SURFACE_WOVEN_COTTON_H_
 #define HEDDLE_RENDER_SURFACE_WOVEN_COTTON_H_
 // Irawan and Marschner 2006: every visible thread segment carries an elliptical highlight that
-// slides with the half vector. Near, that is a texture (BTF); far, its mean over the weave is a
+// slides with the half vector. Near, that is a texture (BTF). Far, its mean over the weave is a
 // BRDF in closed form.
 //
-// BTF = diffuse + specular I F G / ((n . wi)(n . wo)), without 1/pi or 1/4, as printed; the BRDF
-// has the share of the window that the ellipse fills in place of I. Ellipse parameters are per
-// system; a window is as long as its float.
+// BTF = diffuse + specular I F G / ((n . wi)(n . wo)), without 1/pi or 1/4, as printed. In the BRDF
+// the share of the window that the ellipse fills stands in place of I. Ellipse parameters are per
+// system. A window is as long as its float.
 //
 // From near to far: the value is the mean of the BTF over the footprint of
-// WovenPattern::visit_footprint, in closed form (the area of ellipse and square and segment). Both
-// ends are exact, and at every footprint the mean of the values over a repeat is the BRDF.
+// WovenPattern::visit_footprint, in closed form (the common area of ellipse, square and segment).
+// Both ends are exact, and at every footprint the mean of the values over a repeat is the BRDF.
 //
 // Irregular cloth: each segment (or each yarn) draws one of kVariants perturbations of its ellipse,
-// whose mean is 0 in every parameter; the BRDF is the mean over the variants, which is what an
-// endless cloth shows. Tested in tests/render/surface/woven_cotton_test.cpp.
+// whose mean is 0 in every parameter. The BRDF is the mean over the variants, as an endless cloth
+// shows it. Tested in tests/render/surface/woven_cotton_test.cpp.
 
 #include <array>
 #include <cstdint>

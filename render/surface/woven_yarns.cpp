@@ -16,7 +16,7 @@ double smooth_step(double x) {
   return t * t * (3.0 - 2.0 * t);
 }
 
-// Frame of a segment on the cloth: the warp's is that of the cloth, the weft's is turned by 90
+// Frame of a segment on the cloth. The warp's is that of the cloth. The weft's is turned by 90
 // degrees, its y along the weft.
 Vec3d to_segment(YarnSystem system, const Vec3d& w) {
   return system == YarnSystem::kWarp ? w : Vec3d(-w.y(), w.x(), w.z());
@@ -77,8 +77,9 @@ std::optional<FilamentHighlight> filament_highlight(const YarnSegment& segment, 
       material.smoothing > 0.0
           ? 1.0 - smooth_step((std::abs(u) - sharp_max) / (material.smoothing * u_max))
           : 1.0;
-  // Area element a (R + a cos v) du dv of the tube over |wi + wo| times what the angle to the
-  // tangent changes with u; and the map of (u, v) to the cloth, spread over the band's width.
+  // Two factors: the area element a (R + a cos v) du dv of the tube, over |wi + wo| times the rate
+  // at which the angle to the tangent changes with u; and the map of (u, v) to the cloth, spread
+  // over the band's width.
   highlight.factor = 0.5 * segment.width / std::hypot(sum.y(), sum.z()) * phase(material, wi, wo) *
                      fade * kPi / material.highlight_width;
   const double band = material.highlight_width * segment.length;
@@ -221,9 +222,9 @@ double spine_radius(const YarnSegment& segment, double u, double u_max) {
   // Ratio of the conic's axes: above 0 an ellipse, 0 a parabola, below 0 a hyperbola.
   const double ratio = 1.0 + segment.material.curvature * (1.0 + 1.0 / std::tan(u_max));
   const double slope = std::tan(u);
-  // With y = b s(t), tan(t) or tanh(t) = |ratio| tan(u), all three are one formula: y is
-  // proportional to tan(u) / sqrt(1 + ratio^2 tan^2(u)) or, for the hyperbola, with a minus, and R
-  // = (dy/du) / cos(u).
+  // With y = b s(t), tan(t) or tanh(t) = |ratio| tan(u), all three are one formula. y is
+  // proportional to tan(u) / sqrt(1 + ratio^2 tan^2(u)), for the hyperbola with a minus. R =
+  // (dy/du) / cos(u).
   const double sign = ratio < 0.0 ? -1.0 : 1.0;
   const double q = sign * ratio * ratio;
   const double end_slope = std::tan(u_max);

@@ -3,19 +3,20 @@
 // Irawan and Marschner 2012: specular reflection from the fibers of bent yarn segments; the rival
 // of the microcylinder model.
 //
-// A segment is a tube of radius w/2 about a spine that is an arc of a conic: (u, v) is the
-// inclination of the spine, in
-// [-u_max, u_max], and the angle around the yarn, in [-pi/2, pi/2]. Segment frame: x across the
-// yarn, y along it, z up, origin in the middle; on the cloth y = u l / (2 u_max), x = v w / pi.
-// Fibers wind about the spine at the twist angle; twist 0 is a filament yarn, anything else a
-// staple yarn. For two directions the fibers that mirror one into the other lie on a curve: u(v) =
-// const for filaments, v(u) for staples; the highlight is a band of constant width along it.
-// Lengths are in units of the config. The absolute scale of the highlights goes with the square of
-// the unit, as the mean over a segment is not divided by its area: `specular` absorbs it, or the
-// option specular_is_albedo replaces it.
+// A segment is a tube of radius w/2 about a spine that is an arc of a conic. u is the inclination
+// of the spine, in [-u_max, u_max], and v the angle around the yarn, in [-pi/2, pi/2]. Segment
+// frame: x across the yarn, y along it, z up, origin in the middle. On the cloth y = u l / (2
+// u_max) and x = v w / pi. Fibers wind about the spine at the twist angle. Twist 0 is a filament
+// yarn, anything else a staple yarn.
 //
-// The paper is not at hand. What is here is derived from the geometry above and agrees with the
-// terms that public renderers document (Mitsuba 0.x plugin "irawan", LuxCore "cloth");
+// For two directions, the fibers that mirror one into the other lie on a curve: u(v) = const for
+// filaments, v(u) for staples. The highlight is a band of constant width along it. Lengths are in
+// units of the config. The absolute scale of the highlights goes with the square of the unit, as
+// the mean over a segment is not divided by its area. `specular` absorbs it, or the option
+// specular_is_albedo replaces it.
+//
+// The paper is not at hand. This model is derived from the geometry above and agrees with the terms
+// that public renderers document (Mitsuba 0.x plugin "irawan", LuxCore "cloth").
 // docs/surface-models.md says what is left out. Tested in
 // tests/render/surface/woven_yarns_test.cpp.
 
@@ -73,8 +74,8 @@ struct WovenYarnsParameters {
   WovenPattern pattern;
   std::array<YarnMaterial, 2> yarns;  // [YarnSystem]
   /// Scales the highlights so that with k_s = 1 everywhere they return all light that comes evenly
-  /// from the whole upper side, as LuxCore does: k_s up to 1 - k_d then keeps energy on that
-  /// average (not for every single direction).
+  /// from the whole upper side, as LuxCore does. k_s up to 1 - k_d then keeps energy on that
+  /// average, but not for every single direction.
   bool specular_is_albedo = false;
   /// As in WovenCottonParameters: for every single direction.
   bool energy_safe = false;
