@@ -3,7 +3,6 @@
 // All numbers of a plan's policy, each with its reason. docs/plan-method.md says how they work
 // together, docs/plan-experiments.md what was measured about them.
 
-#include <cstddef>
 #include <cstdint>
 
 namespace heddle {
@@ -50,8 +49,6 @@ struct PlanPolicy {
   /// Path-traced samples that take as long as measuring a table: a plan that needs fewer traces
   /// paths.
   double table_samples = 4e6;
-  /// Fabrics whose settings are chosen apart at most: each has up to 6 settings, and they multiply.
-  std::size_t most_apart = 3;
 
   // --- Evidence: what pilots say ---
   /// Relative standard error of a fast way's mean radiance beyond what the table says of it.
@@ -64,7 +61,8 @@ struct PlanPolicy {
   /// Standard errors added to a pilot that says less than the prior: it misses rare large squares
   /// more often than it meets them.
   double doubt_of_less = 0.7;
-  /// Squared errors of hard views are raised by this factor at most.
+  /// Squared errors of hard views are raised by this factor at most: five times is the most that
+  /// was seen.
   double most_stress = 4;
 
   // --- Choice ---
@@ -73,41 +71,49 @@ struct PlanPolicy {
   double caution = 0.25;
   /// Share of the squared tolerance that is aimed at: a picture's noise is itself uncertain.
   double aim = 0.89;
-  /// Standard errors added to the bias where they cost few samples.
+  /// Standard errors added to the bias where they cost few samples: safety that is nearly free.
   double more_caution = 1;
   /// Share of its room that noise keeps under that caution: that many more samples at most.
   double room_kept = 0.88;
   /// Ways that cost so much more than the cheapest are rivals of it: costs are not known better.
   double little_more = 1.25;
-  /// Squared errors that differ by this share of the squared tolerance are alike.
+  /// Squared errors that differ by this share of the squared tolerance are alike: priors are not
+  /// known better, and the fewest changes decide.
   double little_bias = 0.02;
 
   // --- Finding out more ---
-  /// Pilots after the first at most.
+  /// Pilots after the first at most: an end where two ways take turns.
   int most_tries = 16;
-  /// Share of its offer's time that trying the cheapest way may take.
+  /// Share of its offer's time that trying the cheapest way may take: its noise and its speed here
+  /// decide how many samples it needs.
   double try_share = 0.2;
-  /// Share of the offer's time that a larger pilot of paths may take.
+  /// Share of the offer's time that a larger pilot of paths may take: it must stay
+  /// small beside the picture.
   double pilot_share = 0.08;
-  /// Relative standard error at which the noise of paths is known well enough.
+  /// Relative standard error at which the noise of paths is known well enough: less than what
+  /// separates rivals.
   double noise_known = 0.08;
-  /// A way is worth trying to be cheaper if it would take at most this share of the offer's time.
+  /// A way is tried to be cheaper if it would take at most this share of the offer's time: less is
+  /// not worth a trial.
   double cheaper_share = 0.5;
-  /// Share of what it may save that building its data and trying it may take.
+  /// Share of what it may save that building its data and trying it may take: the trial may fail.
   double build_share = 0.25;
-  /// Standard errors that it is given at best.
+  /// Standard errors by which it may be better than expected: about one way in four is.
   double optimism = 0.7;
-  /// Standard errors more at which a choice may well miss.
+  /// Standard errors more at which a choice may miss: squared errors have long tails.
   double doubt = 2;
-  /// Share of the offer's time that a second look at such a choice may take.
+  /// Share of the offer's time that a second look at such a choice may take: a miss costs the whole
+  /// picture.
   double doubt_share = 0.25;
   /// Light between cloths is known well enough at this standard error, relative to the squared
-  /// tolerance.
+  /// tolerance: it then moves the expected error by 2 to 3 %.
   double between_known = 0.05;
-  /// A pilot says nothing if its standard error is more than this many of what is known.
-  double telling = 0.8;
-  /// A larger pilot is made such that its standard error is this many of what is known.
-  double told = 0.6;
+  /// A pilot is useful if its standard error is at most this share of that of what is known: one
+  /// that is noisier hardly changes it.
+  double useful_pilot = 0.8;
+  /// A larger pilot is made such that its standard error is this share: some more than useful, for
+  /// its noise is known only roughly.
+  double wanted_pilot = 0.6;
 };
 
 inline constexpr PlanPolicy kPolicy;

@@ -14,7 +14,7 @@ void Search::add_other_ways() {
   const FabricTables& tables = library_->tables();
   for (const WaySettings& settings : other_ways(scene, *view_, tables)) {
     findings_->add_way(settings, prior_of_way(settings, scene, *view_, tables),
-                       name_of(settings, scene, tables), changes_of(settings, scene, tables),
+                       name_of(settings, scene), changes_of(settings),
                        library_->build_seconds(settings.method, settings.variant));
   }
 }
@@ -80,24 +80,24 @@ bool Search::learn(std::size_t chosen) {
          find_out(chosen, affordable, false);
 }
 
-/// Tries a way against the paths that there are, if that tells more of its error than is known and
-/// has not been done to one of its kind; else against a larger pilot of paths, if one that tells
-/// enough is affordable. False where neither is.
+/// Tries a way against the paths that there are, if that is useful and has not been done to one of
+/// its kind; else against a larger pilot of paths, if a useful one is affordable. False where
+/// neither is.
 bool Search::find_out(std::size_t way, double affordable, bool may_lower) {
   const double known = findings_->ways()[way].candidate.bias_square.error;
   const double samples = findings_->paths().samples();
   if (!findings_->compared_with_these_paths(way) &&
-      pilot_error(samples) <= kPolicy.telling * known) {
+      pilot_error(samples) <= kPolicy.useful_pilot * known) {
     try_out(way, may_lower);
     return true;
   }
   const double most = renderer_->picture_pixels() * kMostSamples;
   double wanted = 2 * samples;
-  while (pilot_error(wanted) > kPolicy.told * known && wanted < most) wanted *= 1.3;
+  while (pilot_error(wanted) > kPolicy.wanted_pilot * known && wanted < most) wanted *= 1.3;
   const bool between_too = findings_->between_matters(findings_->ways()[way]);
   if (between_too) affordable /= 2;
   wanted = std::min(wanted, affordable / seconds_per_path());
-  if (pilot_error(wanted) > kPolicy.telling * known || !more_paths(wanted, affordable))
+  if (pilot_error(wanted) > kPolicy.useful_pilot * known || !more_paths(wanted, affordable))
     return false;
   if (between_too) trace_local();
   return true;

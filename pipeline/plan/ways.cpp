@@ -4,10 +4,8 @@
 
 #include <algorithm>
 #include <set>
-#include <utility>
 
 #include "pipeline/accuracy/measure_accuracy.h"
-#include "pipeline/plan/policy.h"
 
 namespace heddle {
 namespace {
@@ -45,9 +43,9 @@ std::vector<VisibilityBlend> forms_of_visibility(const std::vector<Light>& light
   return list;
 }
 
-/// Every choice of cells, order and voxels for one fabric.
-std::vector<SceneVariant::OfFabric> settings_of_fabric(const FabricFacts& fabric,
-                                                       RenderMethod method, bool with_orders) {
+/// Every choice of cells, order and voxels that all fabrics allow.
+std::vector<SceneVariant::OfFabric> fabric_settings(RenderMethod method,
+                                                    const std::vector<FabricFacts>& fabrics) {
   std::vector<double> cells = {1};
   cells.insert(cells.end(), std::begin(kOtherCells), std::end(kOtherCells));
   std::vector<double> voxels = {1};
@@ -59,31 +57,18 @@ std::vector<SceneVariant::OfFabric> settings_of_fabric(const FabricFacts& fabric
       const FabricVariant variant{.cell_size = cell_size, .voxel_rate = voxel_rate};
       list.push_back({{}, variant});
       for (const int order : kOtherOrders) {
-        if (with_orders && order < fabric.order) list.push_back({order, variant});
+        const auto is_lower = [&](const FabricFacts& fabric) { return order < fabric.order; };
+        if (std::all_of(fabrics.begin(), fabrics.end(), is_lower)) list.push_back({order, variant});
       }
     }
   }
   return list;
 }
 
-/// Every choice for every fabric. The order, which matters least, only where there is one fabric;
-/// and many fabrics all alike.
-std::vector<SceneVariant> choices_of_fabrics(RenderMethod method, const SceneVariant& base,
-                                             const std::vector<FabricFacts>& fabrics) {
-  std::vector<SceneVariant> choices = {base};
-  const bool alike = fabrics.size() > kPolicy.most_apart;
-  for (const FabricFacts& fabric : fabrics) {
-    std::vector<SceneVariant> longer;
-    for (const SceneVariant& choice : choices) {
-      for (const auto& one : settings_of_fabric(fabric, method, fabrics.size() == 1)) {
-        if (alike && !choice.fabrics.empty() && choice.fabrics.begin()->second != one) continue;
-        longer.push_back(choice);
-        longer.back().fabrics[fabric.file] = one;
-      }
-    }
-    choices = std::move(longer);
-  }
-  return choices;
+/// Settings of the fabrics, which all share.
+SceneVariant::OfFabric shared_settings(const WaySettings& way) {
+  return way.variant.fabrics.empty() ? SceneVariant::OfFabric{}
+                                     : way.variant.fabrics.begin()->second;
 }
 
 }  // namespace
@@ -106,38 +91,25 @@ std::string kind_of(const WaySettings& way) {
   return way.variant.stand_ins.empty() ? "precomputed" : "precomputed + surfaces";
 }
 
-std::string name_of(const WaySettings& way, const SceneConfig& scene, const FabricTables& tables) {
+std::string name_of(const WaySettings& way, const SceneConfig& scene) {
   std::string name = render_method_name(way.method);
-  if (is_precomputed(way.method)) {
-    if (way.variant.blend == kSignedDistanceOnly) name += fmt::format(", {}", kDistanceSetting);
-    if (way.variant.blend == kLobesOnly) name += fmt::format(", {}", kGaussiansSetting);
-    for (const FabricFacts& fabric : tables.fabrics) {
-      if (!draws_fibers(scene, way.variant, fabric.file)) continue;
-      const SceneVariant::OfFabric of = way.variant.of(fabric.file);
-      const std::string prefix =
-          tables.fabrics.size() > 1 ? ", " + fabric.file.stem().string() + " " : ", ";
-      if (of.variant.cell_size != 1) name += prefix + cells_setting(of.variant.cell_size);
-      if (of.order) name += prefix + order_setting(*of.order);
-      if (of.variant.voxel_rate != 1) name += prefix + voxels_setting(of.variant.voxel_rate);
-    }
-  }
+  const SceneVariant::OfFabric of = shared_settings(way);
+  if (way.variant.blend == kSignedDistanceOnly) name += fmt::format(", {}", kDistanceSetting);
+  if (way.variant.blend == kLobesOnly) name += fmt::format(", {}", kGaussiansSetting);
+  if (of.variant.cell_size != 1) name += ", " + cells_setting(of.variant.cell_size);
+  if (of.order) name += ", " + order_setting(*of.order);
+  if (of.variant.voxel_rate != 1) name += ", " + voxels_setting(of.variant.voxel_rate);
   for (const std::size_t k : way.variant.stand_ins)
     name += fmt::format(", cloth {} as {}", k + 1, scene.cloths[k].far_surface->name);
   return name;
 }
 
-int changes_of(const WaySettings& way, const SceneConfig& scene, const FabricTables& tables) {
-  int changes = static_cast<int>(way.variant.stand_ins.size());
-  if (!is_precomputed(way.method)) return changes;
-  if (way.variant.blend != VisibilityBlend{}) ++changes;
-  for (const FabricFacts& fabric : tables.fabrics) {
-    if (!draws_fibers(scene, way.variant, fabric.file)) continue;
-    const SceneVariant::OfFabric of = way.variant.of(fabric.file);
-    changes += static_cast<int>(of.order.has_value()) +
-               static_cast<int>(of.variant.cell_size != 1) +
-               static_cast<int>(of.variant.voxel_rate != 1);
-  }
-  return changes;
+int changes_of(const WaySettings& way) {
+  const SceneVariant::OfFabric of = shared_settings(way);
+  return static_cast<int>(way.variant.stand_ins.size()) +
+         static_cast<int>(way.variant.blend != VisibilityBlend{}) +
+         static_cast<int>(of.order.has_value()) + static_cast<int>(of.variant.cell_size != 1) +
+         static_cast<int>(of.variant.voxel_rate != 1);
 }
 
 std::vector<WaySettings> other_ways(const SceneConfig& scene, const ViewFacts& view,
@@ -147,13 +119,14 @@ std::vector<WaySettings> other_ways(const SceneConfig& scene, const ViewFacts& v
     SceneVariant variant;
     variant.stand_ins = far;
     if (!far.empty()) ways.push_back({RenderMethod::kPath, variant});
-    ways.push_back({RenderMethod::kPath6, variant});
-    ways.push_back({RenderMethod::kDualScattering, variant});
     for (const VisibilityBlend& blend : forms_of_visibility(view.lights)) {
       variant.blend = blend;
       for (const RenderMethod method : {RenderMethod::kExact, RenderMethod::kVolume}) {
-        for (SceneVariant& choice : choices_of_fabrics(method, variant, tables.fabrics))
-          ways.push_back({method, std::move(choice)});
+        for (const SceneVariant::OfFabric& one : fabric_settings(method, tables.fabrics)) {
+          for (const FabricFacts& fabric : tables.fabrics) variant.fabrics[fabric.file] = one;
+          ways.push_back({method, variant});
+        }
+        variant.fabrics.clear();
       }
     }
   }

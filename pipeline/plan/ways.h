@@ -1,10 +1,9 @@
 #ifndef HEDDLE_PIPELINE_PLAN_WAYS_H_
 #define HEDDLE_PIPELINE_PLAN_WAYS_H_
-// The candidate ways to make a picture: path tracing, 6 scattering events of it, dual scattering;
-// and the precomputed methods with, for each fabric, the size of its cells and the order of its
-// transfer, voxels, and the form of visibility of the Gaussian lights; each also with the farthest
-// cloths drawn by their `far_surface`. Fabrics share method and form of visibility, pieces of one
-// fabric its data. Pure functions. Tested in tests/pipeline/plan_test.cpp.
+// The candidate ways to make a picture: path tracing, and the precomputed methods with the size of
+// cells, the order of the transfer, voxels, and the form of visibility of the Gaussian lights; each
+// also with the farthest cloths drawn by their `far_surface`. All fabrics share the settings. Pure
+// functions. Tested in tests/pipeline/plan_test.cpp.
 
 #include <string>
 #include <vector>
@@ -36,9 +35,9 @@ std::string family_of(const WaySettings& way);
 std::string kind_of(const WaySettings& way);
 
 /// For people: method and what differs from the fabrics' own settings.
-std::string name_of(const WaySettings& way, const SceneConfig& scene, const FabricTables& tables);
+std::string name_of(const WaySettings& way, const SceneConfig& scene);
 /// How many settings differ from the fabrics' own.
-int changes_of(const WaySettings& way, const SceneConfig& scene, const FabricTables& tables);
+int changes_of(const WaySettings& way);
 
 /// All ways but path tracing.
 std::vector<WaySettings> other_ways(const SceneConfig& scene, const ViewFacts& view,
