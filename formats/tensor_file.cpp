@@ -23,6 +23,7 @@ static_assert(std::endian::native == std::endian::little,
 
 namespace {
 
+using OrderedJson = nlohmann::ordered_json;  // for writing: finds a key by looking at all
 using Json = nlohmann::json;
 
 constexpr std::uint64_t kMaxHeaderBytes = 100'000'000;
@@ -192,23 +193,24 @@ void TensorFileWriter::write(const std::filesystem::path& path) const {
     return info_of(a->second.type).bytes > info_of(b->second.type).bytes;
   });
 
-  std::string text = "{";
+  OrderedJson header = OrderedJson::object();
+  if (!metadata_.empty()) header[kMetadataKey] = metadata_;
   std::uint64_t offset = 0;
+  for (const auto* item : order) {
+    const Tensor& tensor = item->second;
+    OrderedJson entry;
+    entry["dtype"] = info_of(tensor.type).name;
+    entry["shape"] = tensor.shape;
+    entry["data_offsets"] = {offset, offset + tensor.bytes.size()};
+    offset += tensor.bytes.size();
+    header[item->first] = std::move(entry);
+  }
+  std::string text;
   try {
-    if (!metadata_.empty())
-      text += fmt::format("{}:{},", Json(kMetadataKey).dump(), Json(metadata_).dump());
-    for (const auto* item : order) {
-      const Tensor& tensor = item->second;
-      text += fmt::format("{}:{{\"dtype\":\"{}\",\"shape\":[{}],\"data_offsets\":[{},{}]}},",
-                          Json(item->first).dump(), info_of(tensor.type).name,
-                          fmt::join(tensor.shape, ","), offset, offset + tensor.bytes.size());
-      offset += tensor.bytes.size();
-    }
+    text = header.dump();
   } catch (const nlohmann::json::exception&) {
     throw FileError(path.string() + ": a tensor name or metadata string is not valid UTF-8");
   }
-  if (text.ends_with(',')) text.pop_back();
-  text += '}';
   text.resize((text.size() + 7) / 8 * 8,
               ' ');  // 8 bytes of length before it: the data start at a multiple of 8
   const std::uint64_t header_bytes = text.size();
