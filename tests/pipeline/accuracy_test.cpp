@@ -285,8 +285,11 @@ AccuracyTable measured_table() {
   std::ofstream(folder.path() / "fabric.toml") << kSmallFabric;
   std::ostringstream silent;
   Console console(silent, false, true);
-  StageContext context{
-      .cache = Cache(folder.path() / "cache"), .console = &console, .seed = {}, .results = {}};
+  StageContext context{.cache = Cache(folder.path() / "cache"),
+                       .console = &console,
+                       .fabric_seed = {},
+                       .picture_seed = {},
+                       .results = {}};
   FabricStages stages(folder.path() / "fabric.toml", context);
   AccuracyData data;
   data.pack = load_pack(stages.pack(kEverything).path);
