@@ -193,10 +193,10 @@ double norm_above(const Harmonics& c) {
 }
 
 // What the projection weighs directions by, sum_j c_j Y_j, against that of the moments by
-// quadrature. Lights wholly above the horizon are projected to half a per cent. Of those that it
-// cuts, the table takes 64 x 64 points, of which some lie on the wrong side: moments are off by up
-// to 6e-3 of their norm, and the dual, whose eigenvalues are at most 1 / 0.05, makes up to
-// 1 / sqrt(0.05) = 4.5 times as much of it.
+// quadrature. The table's moments of lights wholly above the horizon are good to 2e-3; the dual,
+// whose eigenvalues are at most 1 / 0.05, makes up to 1 / sqrt(0.05) = 4.5 times as much of it. Of
+// lights that the horizon cuts, the table takes 64 x 64 points, of which some lie on the wrong
+// side: moments are off by up to 6e-3 of their norm.
 TEST(MultipleScatteringAgreement, FaceLightIsTheProjectionOfItsMomentsAboveTheHorizon) {
   double worst = 0;
   for (const float sharpness : {0.0F, 2.0F, 30.0F, 150.0F}) {
@@ -230,7 +230,7 @@ TEST(MultipleScatteringAgreement, FaceLightIsTheProjectionOfItsMomentsAboveTheHo
       const double error = norm_above(difference) / norm_above(dual.cast<double>());
       worst = std::max(worst, error);
       const bool is_cut = sharpness < 30 || unit.z() < 0.5F;
-      EXPECT_LT(error, is_cut ? 0.03 : 0.005) << sharpness << ", axis " << unit.transpose();
+      EXPECT_LT(error, is_cut ? 0.03 : 0.01) << sharpness << ", axis " << unit.transpose();
     }
   }
   std::printf("  largest error of the projection: %.4f of its norm\n", worst);
