@@ -162,8 +162,11 @@ class Stages {
   Console console_{said_, false, true};
 
  public:
-  StageContext context_{
-      .cache = Cache(folder_.path() / "cache"), .console = &console_, .seed = {}, .results = {}};
+  StageContext context_{.cache = Cache(folder_.path() / "cache"),
+                        .console = &console_,
+                        .fabric_seed = {},
+                        .picture_seed = {},
+                        .results = {}};
 };
 
 Names differing(const std::map<std::string, std::string>& a,
@@ -228,7 +231,7 @@ TEST(StageKeys, VariantsChangeWhatTheySayAndAreWhatAConfigWouldSay) {
   EXPECT_EQ(voxels, stages.keys(stages.of(fabric_text({{"volume.voxels_per_radius", "1.5"}}))));
   EXPECT_EQ(differences(stages.keys(stages.of(fabric_text({}), {}, BakeChoices::kPrinted))),
             joined(kOfLight));
-  stages.context_.seed = 8;
+  stages.context_.fabric_seed = 8;
   EXPECT_EQ(stages.keys(stages.of(fabric_text({}))),
             stages.keys(stages.of(fabric_text({{"seed", "8"}}))));
 }
