@@ -819,10 +819,8 @@ TEST(PlanEndToEnd, LightFromOtherClothIsMissingFromFastMethods) {
   const Json near = plan_with_wall_at(-0.4);
   const Json far = plan_with_wall_at(-400);
   EXPECT_GT(bias_in(near, "exact"), 1.1 * bias_in(far, "exact"));
-  EXPECT_GT(bias_in(near, "dual-scattering"), bias_in(far, "dual-scattering"));
-  EXPECT_NEAR(bias_in(near, "path-6") / bias_in(far, "path-6"), 1, 0.01)
-      << "traces light from everywhere";
-  EXPECT_EQ(bias_in(near, "path"), 0);
+  EXPECT_GT(bias_in(near, "volume"), bias_in(far, "volume"));
+  EXPECT_EQ(bias_in(near, "path"), 0) << "traces light from everywhere";
 }
 
 TEST(PlanEndToEnd, LightFromBehindIsMissingFromPrecomputedMethods) {
@@ -848,8 +846,7 @@ TEST(PlanEndToEnd, LightFromBehindIsMissingFromPrecomputedMethods) {
   // A few pixels see between the fibers; the picture's mean is so much lower than the cloth's.
   const double gaps = 1.02;
   EXPECT_LT(bias_in(behind, "exact"), gaps * std::hypot(0.2, missing));
-  EXPECT_LT(bias_in(behind, "path-6"), gaps) << "traces light from everywhere";
-  EXPECT_EQ(bias_in(behind, "path"), 0);
+  EXPECT_EQ(bias_in(behind, "path"), 0) << "traces light from everywhere";
 }
 
 TEST(PlanEndToEnd, SaysWhatIsOutOfReach) {
