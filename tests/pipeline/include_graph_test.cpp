@@ -50,7 +50,7 @@ const std::vector<std::pair<std::string, std::string>> kConfined = {
     {R"(toml\+\+.*)", R"(formats/toml_table\.cpp)"},
     {R"(xxhash\.h)", R"(formats/content_hash\.cpp)"},
     {R"(CLI/.*)", R"(pipeline/main\.cpp)"},
-    {R"(nlohmann/.*)", R"((.*\.cpp|pipeline/.*\.h))"},
+    {R"(nlohmann/.*)", R"((.*\.cpp|pipeline/.*\.h|formats/seal_json\.h))"},
     {R"(Eigen/.*)", R"((fibers|precompute|render|pipeline)/.*|formats/tensor_file\.cpp)"},
 };
 
