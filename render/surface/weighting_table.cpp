@@ -240,7 +240,7 @@ Factors factored(const Eigen::MatrixXf& matrix, double contribution) {
   result.rank = static_cast<int>(rank);
   result.right = RowMajor::Zero(matrix.cols(), static_cast<Eigen::Index>(padded(result.rank)));
   result.right.leftCols(rank) = gram.vectors.rightCols(rank).rowwise().reverse().cast<float>();
-  result.left = matrix * result.right;
+  result.left.noalias() = matrix * result.right;
   return result;
 }
 

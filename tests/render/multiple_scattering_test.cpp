@@ -207,10 +207,12 @@ TEST(MultipleScatteringAgreement, FaceLightIsTheProjectionOfItsMomentsAboveTheHo
       std::array<float, sh_count(5)> got;
       shape.project(5, false, unit, got.data());
       Harmonics expected = Harmonics::Zero();
-      const int rings = 400;
-      const int azimuths = 800;
-      for (int r = 0; r < rings; ++r) {
-        const double z = (r + 0.5) / rings;
+      // Exact for the sharpest light straight above too, exp(150 (z - 1)): 400 equal rings leave it
+      // 0.6 % low.
+      const QuadratureRule rule = gauss_legendre(100, 0, 1);
+      const int azimuths = 200;
+      for (std::size_t r = 0; r < rule.nodes.size(); ++r) {
+        const double z = rule.nodes[r];
         for (int a = 0; a < azimuths; ++a) {
           const double phi = 2 * kPi * (a + 0.5) / azimuths;
           const Vec3d w(std::sqrt(1 - z * z) * std::cos(phi), std::sqrt(1 - z * z) * std::sin(phi),
@@ -218,7 +220,8 @@ TEST(MultipleScatteringAgreement, FaceLightIsTheProjectionOfItsMomentsAboveTheHo
           Harmonics y;
           evaluate_sh(5, w, y.data());
           const double light = sg_value({unit.cast<double>(), sharpness}, w) /
-                               sg_mass(static_cast<double>(sharpness)) * 2 * kPi / rings / azimuths;
+                               sg_mass(static_cast<double>(sharpness)) * 2 * kPi * rule.weights[r] /
+                               azimuths;
           expected += light * y;
         }
       }
