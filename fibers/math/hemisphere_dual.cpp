@@ -27,8 +27,7 @@ HemisphereDual::HemisphereDual(int order) : order_(order) {
     const SymmetricEigen eigen = symmetric_eigen(gram);
     Eigen::VectorXd inverse = eigen.values;
     for (int i = 0; i < n; ++i) inverse[i] = inverse[i] < kLeastShare ? 0.0 : 1 / inverse[i];
-    const Eigen::MatrixXd block =
-        eigen.vectors * inverse.asDiagonal() * eigen.vectors.transpose();
+    const Eigen::MatrixXd block = eigen.vectors * inverse.asDiagonal() * eigen.vectors.transpose();
     std::vector<float>& stored = blocks_[static_cast<std::size_t>(m)];
     for (int row = 0; row < n; ++row) {
       for (int column = 0; column < n; ++column)
