@@ -123,14 +123,9 @@ std::vector<WaySettings> other_ways(const SceneConfig& scene, const ViewFacts& v
       variant.blend = blend;
       for (const RenderMethod method : {RenderMethod::kExact, RenderMethod::kVolume}) {
         for (const SceneVariant::OfFabric& one : fabric_settings(method, tables.fabrics)) {
-          variant.fabrics.clear();
-          // A fabric as its file says has no entry: the scene's own data serve.
-          if (one != SceneVariant::OfFabric{}) {
-            for (const FabricFacts& fabric : tables.fabrics) variant.fabrics[fabric.file] = one;
-          }
+          variant.fabrics = variant_of_fabrics(scene, one).fabrics;
           ways.push_back({method, variant});
         }
-        variant.fabrics.clear();
       }
     }
   }

@@ -377,6 +377,9 @@ TEST(PlanWays, FabricsShareTheirSettings) {
   SmallPlan plan;
   const std::size_t of_one = other_ways(plan.scene, plan.view, plan.tables).size();
   plan.tables.fabrics.push_back({"two.toml", "two", 5, false, even_table()});
+  plan.scene.cloths.push_back(plan.scene.cloths[0]);
+  plan.scene.cloths.back().fabric = "two.toml";
+  plan.view.cloths.push_back(plan.view.cloths[0]);
   const std::vector<WaySettings> ways = other_ways(plan.scene, plan.view, plan.tables);
   EXPECT_EQ(ways.size(), of_one) << "the order 3 is not below that of both";
   for (const WaySettings& way : ways)
