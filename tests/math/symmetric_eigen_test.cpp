@@ -57,7 +57,9 @@ TEST(SymmetricEigen, SingularValuesAreThoseTheMatrixWasMadeOf) {
                                  orthonormal(kColumns).transpose();
   const RightSingular singular = right_singular(matrix);
   for (int r = 0; r <= kColumns; ++r) {
-    if (r < kColumns) EXPECT_NEAR(singular.values[r], values[r], 1e-14);
+    if (r < kColumns) {
+      EXPECT_NEAR(singular.values[r], values[r], 1e-14);
+    }
     EXPECT_NEAR((of_rank(matrix, singular, r) - matrix).norm(), values.tail(kColumns - r).norm(),
                 1e-14);
   }
