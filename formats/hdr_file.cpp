@@ -13,13 +13,13 @@
 #include <vector>
 
 #include "formats/atomic_file.h"
+#include "formats/image_file.h"
 #include "formats/input_error.h"
 #include "formats/memory_need.h"
 
 namespace heddle {
 namespace {
 
-constexpr int kMaxExtent = 16384;
 constexpr std::uint64_t kMaxValues = std::uint64_t{1} << 28;
 // The new encoding reaches 16 pixels per byte. The old one has no bound, but no real sky is this
 // even.

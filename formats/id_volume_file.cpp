@@ -32,7 +32,7 @@ using IdTree = openvdb::tree::Tree4<std::int32_t, 5, 4, 3>::Type;
 using IdGrid = openvdb::Grid<IdTree>;
 constexpr const char* kGridType = "Tree_int32_5_4_3";
 
-constexpr int kMaxExtent = 4096;
+constexpr int kMaxEdge = 4096;
 constexpr std::uint64_t kMaxVoxels = std::uint64_t{1} << 31;
 constexpr std::int32_t kEmpty = -1;
 // OpenVDB takes id - kEmpty
@@ -53,8 +53,8 @@ constexpr std::string_view kZeroIdentifier = "00000000-0000-0000-0000-0000000000
 std::string size_problem(const std::array<int, 3>& size) {
   std::uint64_t voxels = 1;
   for (const int extent : size) {
-    if (extent < 1 || extent > kMaxExtent) {
-      return fmt::format("{} voxels along an axis (1 to {})", extent, kMaxExtent);
+    if (extent < 1 || extent > kMaxEdge) {
+      return fmt::format("{} voxels along an axis (1 to {})", extent, kMaxEdge);
     }
     voxels *= static_cast<std::uint64_t>(extent);
   }

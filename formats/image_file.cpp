@@ -34,7 +34,6 @@ namespace heddle {
 
 namespace {
 
-constexpr int kMaxExtent = 16384;
 constexpr std::size_t kMaxChannels = 1024;
 constexpr std::uint64_t kMaxSamples = std::uint64_t{1} << 30;  // over all channels: 4 GiB of memory
 // rows that are decoded before memory for more is used

@@ -28,10 +28,13 @@ struct Image {
   std::map<std::string, std::string> metadata;  // string attributes
 };
 
+/// Pixels along an edge; pictures that are larger are refused.
+inline constexpr int kMaxExtent = 16384;
+
 /// Writes atomically. Half channels are clamped to the largest finite half (65504).
 void write_exr(const std::filesystem::path& path, const Image& image);
-/// Reads flat scan-line or tiled single-part files up to 16384 x 16384 and 1024 channels; refuses
-/// deep and multi-part.
+/// Reads flat scan-line or tiled single-part files up to kMaxExtent x kMaxExtent and 1024 channels;
+/// refuses deep and multi-part.
 Image read_exr(const std::filesystem::path& path);
 
 /// What the first bytes of a PNG file say.

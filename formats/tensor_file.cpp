@@ -178,10 +178,11 @@ void TensorFileWriter::set_metadata(const std::string& key, const std::string& v
 }
 
 void TensorFileWriter::add_raw(const std::string& name, TensorType type,
-                               std::vector<std::uint64_t> shape, std::span<const std::byte> bytes) {
+                               const std::vector<std::uint64_t>& shape,
+                               std::span<const std::byte> bytes) {
   assert(name != kMetadataKey && !tensors_.contains(name));
   assert(byte_count(type, shape) == bytes.size());
-  tensors_[name] = {type, std::move(shape), {bytes.begin(), bytes.end()}};
+  tensors_[name] = {type, shape, {bytes.begin(), bytes.end()}};
 }
 
 void TensorFileWriter::write(const std::filesystem::path& path) const {

@@ -39,13 +39,14 @@ class TensorFileWriter {
   void set_metadata(const std::string& key, const std::string& value);
   /// Copies `values`; shape's product must equal values.size() (assert).
   template <class T>
-  void add(const std::string& name, std::vector<std::uint64_t> shape, std::span<const T> values) {
-    add_raw(name, tensor_type_of<T>(), std::move(shape), std::as_bytes(values));
+  void add(const std::string& name, const std::vector<std::uint64_t>& shape,
+           std::span<const T> values) {
+    add_raw(name, tensor_type_of<T>(), shape, std::as_bytes(values));
   }
   void write(const std::filesystem::path& path) const;
 
  private:
-  void add_raw(const std::string& name, TensorType type, std::vector<std::uint64_t> shape,
+  void add_raw(const std::string& name, TensorType type, const std::vector<std::uint64_t>& shape,
                std::span<const std::byte> bytes);
   struct Tensor {
     TensorType type;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <map>
+#include <nlohmann/json.hpp>
 
 #include "formats/atomic_file.h"
 #include "formats/input_error.h"
@@ -15,8 +16,6 @@ namespace heddle {
 namespace {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::json;
-
 /// The files of an artifact, by name inside its folder; one without a name where the artifact is a
 /// file.
 using Seals = std::map<std::string, FileSeal>;
@@ -30,8 +29,8 @@ Seals seals_of(const fs::path& artifact) {
   return seals;
 }
 
-Json record_json(const Seals& seals, const BuildCost& cost) {
-  Json files = Json::object();
+nlohmann::json record_json(const Seals& seals, const BuildCost& cost) {
+  nlohmann::json files = nlohmann::json::object();
   for (const auto& [name, seal] : seals) files[name] = json_of(seal);
   return {{"files", files},
           {"seconds", cost.time.seconds},
@@ -44,7 +43,7 @@ Json record_json(const Seals& seals, const BuildCost& cost) {
 
 BuildCost recorded_build_cost(const fs::path& record_file) {
   try {
-    const Json record = read_sealed_json(record_file);
+    const nlohmann::json record = read_sealed_json(record_file);
     return {{record.at("seconds").get<double>(), record.at("core_seconds").get<double>()},
             record.at("threads").get<int>()};
   } catch (const std::exception&) {
@@ -55,7 +54,7 @@ BuildCost recorded_build_cost(const fs::path& record_file) {
 ArtifactCheck check_artifact(const fs::path& artifact, const fs::path& record_file) {
   if (!fs::exists(artifact)) return {};
   try {
-    const Json record = read_sealed_json(record_file);
+    const nlohmann::json record = read_sealed_json(record_file);
     for (const auto& [name, seal] : record.at("files").items()) {
       verify_seal(name.empty() ? artifact : artifact / name, seal_of(seal),
                   record_file.filename().string());

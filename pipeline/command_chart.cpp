@@ -4,6 +4,7 @@
 #include <cmath>
 #include <fstream>
 #include <new>
+#include <nlohmann/json.hpp>
 #include <set>
 
 #include "formats/atomic_file.h"
@@ -161,10 +162,8 @@ class ChartMaker {
     PictureResult picture;
     for (int n = 0; n < (repeat ? kRepeats : 1) && (n == 0 || spent.seconds < kLongEnough); ++n) {
       picture = job_->render(request, title, true);  // a chart drives methods past their limits
-      const WorkTime time = {picture.report.at("seconds").get<double>(),
-                             picture.report.at("core_seconds").get<double>()};
-      if (n == 0 || time.seconds < best.seconds) best = time;
-      spent = spent + time;
+      if (n == 0 || picture.time.seconds < best.seconds) best = picture.time;
+      spent = spent + picture.time;
     }
     write_png(file(key + ".png"), picture.image.width, picture.image.height,
               tone_map(layer_of(picture.image, "", key), 0));
@@ -176,7 +175,7 @@ class ChartMaker {
                          {"threads", working_threads()},
                          {"render_seconds", best.seconds},
                          {"render_core_seconds", best.core_seconds},
-                         {"report", picture.report}};
+                         {"report", picture_report(picture)}};
     write_sealed_json(file(key + ".json"), record);
     made_.insert(key);
     return record;

@@ -1,4 +1,5 @@
 #include <iostream>
+#include <nlohmann/json.hpp>
 
 #include "pipeline/commands.h"
 #include "pipeline/pack_check.h"

@@ -1,4 +1,5 @@
 #include <iostream>
+#include <nlohmann/json.hpp>
 
 #include "formats/input_error.h"
 #include "pipeline/commands.h"

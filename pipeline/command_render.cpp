@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
 
@@ -41,12 +42,6 @@ void apply_overrides(const RenderOptions& options, PictureRequest& request) {
   request.local = options.local;
   request.bounces = options.bounces;
   request.estimator = estimators.at(options.estimator);
-}
-
-void write_picture(const PictureResult& picture, const std::filesystem::path& output, Job& job) {
-  write_exr(output, picture.image);
-  write_picture_report(output, picture);
-  job.add_artifact(output);
 }
 
 /// Variance of one sample of a pixel as the picture itself shows it, relative to the squared mean
@@ -89,23 +84,24 @@ int render_within(double tolerance, const RenderOptions& options, Job& job) {
     spp = frame.spp;
     return more_samples(way.candidate, noise_square, frame.spp, tolerance);
   };
-  PictureResult picture = scene.render(request, "render");
+  const PictureResult picture = scene.render(request, "render");
   const double noise = std::sqrt(noise_square.value / spp);
   const double error = std::hypot(std::sqrt(std::max(0.0, way.candidate.bias_square.value)), noise);
   const std::string done = fmt::format(
       "{}, {} spp in {:.3g} s: expected error {:.3g} %, of which noise {:.3g} % (measured in the "
       "picture)",
-      way.candidate.name, spp, picture.report.at("seconds").get<double>(), 100 * error,
-      100 * noise);
+      way.candidate.name, spp, picture.time.seconds, 100 * error, 100 * noise);
   if (error > tolerance) {
     job.console().warn(done + fmt::format("; more than the {:.3g} % asked for", 100 * tolerance));
   } else {
     job.console().say(done);
   }
-  picture.report["plan"] = plan_json(plan);
-  picture.report["expected_error"] = error;
-  write_picture(picture, options.output, job);
-  job.add_entry("plan", plan_json(plan));
+  nlohmann::ordered_json report = picture_report(picture);
+  report["plan"] = plan_json(plan);
+  report["expected_error"] = error;
+  write_picture(options.output, picture, report);
+  job.add_artifact(options.output);
+  job.add_entry("plan", report["plan"]);
   job.add_entry("expected_error", error);
   job.finish();
   return 0;
@@ -126,7 +122,9 @@ int render_command(const RenderOptions& options, const CommonOptions& common) {
   SceneJob scene(options.scene, job.context(), variant_of_order(options.scene, options.order));
   PictureRequest request = scene.request(find_view(scene.config(), options.view));
   apply_overrides(options, request);
-  write_picture(scene.render(request, "render"), options.output, job);
+  const PictureResult picture = scene.render(request, "render");
+  write_picture(options.output, picture, picture_report(picture));
+  job.add_artifact(options.output);
   job.finish();
   return 0;
 }

@@ -28,14 +28,13 @@ void provide_picture(SceneJob& scene, const PictureRequest& request, const fs::p
       .fabric = scene.config().name, .stage = title, .key = stage.key, .artifact = cached};
   if (!is_sound(stage, context)) {
     const Stopwatch watch;
-    publish_artifact(folder, context.cache.record(stage.name, stage.key),
-                     [&](const fs::path& temporary) {
-                       const PictureResult picture = scene.render(request, title);
-                       make_folder(temporary);
-                       write_exr(temporary / cached.filename(), picture.image);
-                       write_picture_report(temporary / cached.filename(), picture);
-                       return BuildCost{watch.elapsed(), working_threads()};
-                     });
+    publish_artifact(
+        folder, context.cache.record(stage.name, stage.key), [&](const fs::path& temporary) {
+          const PictureResult picture = scene.render(request, title);
+          make_folder(temporary);
+          write_picture(temporary / cached.filename(), picture, picture_report(picture));
+          return BuildCost{watch.elapsed(), working_threads()};
+        });
     result.built = true;
     result.seconds = watch.elapsed().seconds;
   } else {

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Installs what the program and its tests need on Debian 12; the only list of packages. With --tests also the browser in which a
-# test opens the page of a chart, and clang-format for tests/lint.sh. Does nothing where all of them are there already.
+# test opens the page of a chart, clang-format and clang-tidy for tests/lint.sh. Does nothing where all of them are there already.
 set -euo pipefail
 
 packages=(
@@ -10,7 +10,7 @@ packages=(
   libgtest-dev libbenchmark-dev python3 python3-numpy
 )
 
-[[ ${1:-} == --tests ]] && packages+=(chromium clang-format-14)
+[[ ${1:-} == --tests ]] && packages+=(chromium clang-format-14 clang-tidy-14)
 
 missing=()
 for package in "${packages[@]}"; do

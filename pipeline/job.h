@@ -6,7 +6,7 @@
 
 #include <chrono>
 #include <filesystem>
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <utility>
 #include <vector>
@@ -25,9 +25,7 @@ class Job {
   StageContext& context() { return context_; }
   void add_artifact(const std::filesystem::path& path) { artifacts_.push_back(path); }
   /// One more entry of the JSON report.
-  void add_entry(const std::string& name, nlohmann::ordered_json value) {
-    entries_.emplace_back(name, std::move(value));
-  }
+  void add_entry(const std::string& name, const nlohmann::ordered_json& value);
   /// Prints the report.
   void finish() const;
 
@@ -37,7 +35,7 @@ class Job {
   Console console_;
   StageContext context_;
   std::vector<std::filesystem::path> artifacts_;
-  std::vector<std::pair<std::string, nlohmann::ordered_json>> entries_;
+  std::vector<std::pair<std::string, std::string>> entries_;  // name, JSON text
 };
 
 }  // namespace heddle

@@ -1,5 +1,7 @@
 #include "pipeline/picture_compare.h"
 
+#include <nlohmann/json.hpp>
+
 #include <fmt/format.h>
 
 #include "formats/input_error.h"

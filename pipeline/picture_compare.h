@@ -7,7 +7,7 @@
 // tests/pipeline/picture_compare_test.cpp.
 
 #include <filesystem>
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 
 #include "formats/image_file.h"

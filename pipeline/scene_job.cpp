@@ -5,13 +5,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 #include "formats/atomic_file.h"
 #include "formats/content_hash.h"
 #include "formats/input_error.h"
 #include "pipeline/interrupt.h"
 #include "pipeline/version.h"
-#include "pipeline/warnings.h"
 #include "render/cloth_scene.h"
 #include "render/precomputed_renderer.h"
 #include "render/render_output.h"
@@ -379,21 +379,34 @@ PictureResult SceneJob::render(const PictureRequest& request, const std::string&
       {"heddle.worldToCamera", camera.world_to_camera_text()},
   };
   result.image = image_of(frame, metadata);
-  for (const auto& [name, value] : metadata) result.report[name] = value;
-  result.report["seconds"] = time.seconds;
-  result.report["core_seconds"] = time.core_seconds;
-  if (environment_error > 0) result.report["environment_fit_relative_error"] = environment_error;
-  result.report["failed_shell_walks"] = loaded.scene->failed_walks();
-  result.report["flipped_tetrahedra"] = loaded.scene->flipped_tets();
-  result.report["degenerate_tetrahedra"] = loaded.scene->degenerate_tets();
-  result.report["warnings"] = warnings_report(warnings);
+  result.time = time;
+  result.environment_error = environment_error;
+  result.failed_shell_walks = loaded.scene->failed_walks();
+  result.flipped_tetrahedra = loaded.scene->flipped_tets();
+  result.degenerate_tetrahedra = loaded.scene->degenerate_tets();
+  result.warnings = std::move(warnings);
   return result;
 }
 
-void write_picture_report(const fs::path& exr, const PictureResult& picture) {
+Json picture_report(const PictureResult& picture) {
+  Json report;
+  for (const auto& [name, value] : picture.image.metadata) report[name] = value;
+  report["seconds"] = picture.time.seconds;
+  report["core_seconds"] = picture.time.core_seconds;
+  if (picture.environment_error > 0)
+    report["environment_fit_relative_error"] = picture.environment_error;
+  report["failed_shell_walks"] = picture.failed_shell_walks;
+  report["flipped_tetrahedra"] = picture.flipped_tetrahedra;
+  report["degenerate_tetrahedra"] = picture.degenerate_tetrahedra;
+  report["warnings"] = warnings_report(picture.warnings);
+  return report;
+}
+
+void write_picture(const fs::path& exr, const PictureResult& picture, const Json& report) {
+  write_exr(exr, picture.image);
   write_png(fs::path(exr).replace_extension(".png"), picture.image.width, picture.image.height,
             tone_map(layer_of(picture.image, "", exr.string()), 0));
-  write_file_atomically(fs::path(exr).replace_extension(".json"), picture.report.dump(2) + "\n");
+  write_file_atomically(fs::path(exr).replace_extension(".json"), report.dump(2) + "\n");
 }
 
 }  // namespace heddle

@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <map>
 #include <memory>
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <set>
 #include <span>
@@ -18,6 +18,8 @@
 #include "formats/image_file.h"
 #include "pipeline/stages.h"
 #include "pipeline/surface_stages.h"
+#include "pipeline/warnings.h"
+#include "pipeline/work_time.h"
 #include "render/cloth_scene.h"
 #include "render/methods.h"
 #include "render/path_tracer.h"
@@ -72,9 +74,17 @@ struct PictureRequest {
 
 /// A picture and what is worth knowing of its making.
 struct PictureResult {
-  Image image;
-  nlohmann::ordered_json report;
+  Image image;  // its metadata name scene, method, key, seed, samples and crop
+  WorkTime time;
+  double environment_error = 0;  // relative, of the Gaussians fitted to environments
+  std::uint64_t failed_shell_walks = 0;
+  std::uint32_t flipped_tetrahedra = 0;
+  std::uint32_t degenerate_tetrahedra = 0;
+  std::vector<Warning> warnings;
 };
+
+/// All of it but the pixels, for programs.
+nlohmann::ordered_json picture_report(const PictureResult& picture);
 
 class SceneJob {
  public:
@@ -137,8 +147,9 @@ class SceneJob {
   std::map<RenderMethod, std::unique_ptr<Loaded>> loaded_;
 };
 
-/// Beside PATH.exr: a tone-mapped PATH.png and the report as PATH.json.
-void write_picture_report(const std::filesystem::path& exr, const PictureResult& picture);
+/// PATH.exr, and beside it a tone-mapped PATH.png and the report as PATH.json.
+void write_picture(const std::filesystem::path& exr, const PictureResult& picture,
+                   const nlohmann::ordered_json& report);
 
 }  // namespace heddle
 

@@ -6,7 +6,7 @@
 // tests/pipeline/artifact_record_test.cpp.
 
 #include <filesystem>
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 
 namespace heddle {
 

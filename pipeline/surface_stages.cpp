@@ -13,30 +13,28 @@ namespace heddle {
 namespace {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::json;
-
 /// All that a weighting table depends on.
 std::string weights_text(const MicrocylinderFabric& fabric, const InteractiveSettings& settings) {
-  Json tangents = Json::array();
+  nlohmann::json tangents = nlohmann::json::array();
   for (const TangentSample& sample : tangent_samples(fabric, settings.most_tangents)) {
     tangents.push_back({sample.thread, sample.direction, sample.sine, sample.cosine, sample.share});
   }
-  Json shares = Json::array();
+  nlohmann::json shares = nlohmann::json::array();
   for (const MicrocylinderThread& thread : fabric.threads) shares.push_back(thread.share);
   const WeightingTableSettings& table = settings.table;
-  return Json{{"tangents", tangents},
-              {"shares", shares},
-              {"blend", fabric.conventions.blend},
-              {"table", {table.columns, table.rows, table.contribution}}}
+  return nlohmann::json{{"tangents", tangents},
+                        {"shares", shares},
+                        {"blend", fabric.conventions.blend},
+                        {"table", {table.columns, table.rows, table.contribution}}}
       .dump();
 }
 
 /// The shapes of everything in a scene.
 std::string geometry_text(const SceneConfig& config,
                           const std::function<std::string(const fs::path&)>& geometry_key) {
-  Json cloths = Json::array();
+  nlohmann::json cloths = nlohmann::json::array();
   for (const ClothConfig& cloth : config.cloths) {
-    Json shape = {{"underlay", cloth.underlay}};
+    nlohmann::json shape = {{"underlay", cloth.underlay}};
     if (cloth.mesh) {
       shape["mesh"] = {content_hash_of_file(cloth.mesh->path), cloth.mesh->mm_per_unit};
     } else {
@@ -45,10 +43,10 @@ std::string geometry_text(const SceneConfig& config,
     if (!cloth.surface) shape["fibers"] = geometry_key(cloth.fabric);
     cloths.push_back(shape);
   }
-  Json meshes = Json::array();
+  nlohmann::json meshes = nlohmann::json::array();
   for (const MeshFile& mesh : config.meshes)
     meshes.push_back({content_hash_of_file(mesh.path), mesh.mm_per_unit});
-  return Json{{"cloths", cloths}, {"meshes", meshes}}.dump();
+  return nlohmann::json{{"cloths", cloths}, {"meshes", meshes}}.dump();
 }
 
 Stage maps_stage(const std::string& geometry, std::size_t cloth, ClothSide side) {

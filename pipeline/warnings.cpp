@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <optional>
 
 #include "fibers/math/random.h"
@@ -223,24 +224,21 @@ nlohmann::ordered_json warnings_report(std::span<const Warning> warnings) {
   return report;
 }
 
-std::vector<Warning> warnings_of(const nlohmann::json& report) {
-  std::vector<Warning> warnings;
-  for (const auto& entry : report) {
-    warnings.push_back({entry.at("subject").get<std::string>(), entry.at("what").get<std::string>(),
-                        entry.at("expected_relative_error").get<double>(),
-                        entry.at("instead").get<std::string>()});
-  }
-  return warnings;
-}
-
 std::vector<Warning> read_warnings(const std::filesystem::path& path) {
   const nlohmann::json report = read_json(path);
+  std::vector<Warning> warnings;
   try {
     if (report.is_object() && !report.contains("warnings")) return {};
-    return warnings_of(report.at("warnings"));
+    for (const auto& entry : report.at("warnings")) {
+      warnings.push_back({entry.at("subject").get<std::string>(),
+                          entry.at("what").get<std::string>(),
+                          entry.at("expected_relative_error").get<double>(),
+                          entry.at("instead").get<std::string>()});
+    }
   } catch (const nlohmann::json::exception& error) {
     throw FileError(fmt::format("{}: no picture's report: {}", path.string(), error.what()));
   }
+  return warnings;
 }
 
 PackFacts pack_facts(const FabricPack& pack, const TileScene& tile) {

@@ -8,7 +8,7 @@
 // tests/stability/warnings_test.cpp.
 
 #include <filesystem>
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <span>
 #include <string>
 #include <vector>
@@ -34,9 +34,8 @@ struct Warning {
 
 /// "warning: cells: ...; expect errors of about 12 %. Do this."
 std::string warning_text(const Warning& warning);
-/// [{"subject", "what", "expected_relative_error", "instead"}], and back.
+/// [{"subject", "what", "expected_relative_error", "instead"}]
 nlohmann::ordered_json warnings_report(std::span<const Warning> warnings);
-std::vector<Warning> warnings_of(const nlohmann::json& report);
 /// The warnings in the report beside a picture. Errors: FileError.
 std::vector<Warning> read_warnings(const std::filesystem::path& path);
 

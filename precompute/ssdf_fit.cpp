@@ -15,7 +15,7 @@
 namespace heddle {
 namespace {
 
-constexpr int kN = VisibilityMaps::kResolution;
+constexpr int kMapSize = VisibilityMaps::kResolution;
 
 // Rows below the horizon that are fitted although nothing is open there.
 constexpr int kMarginRows = 2;
@@ -51,9 +51,9 @@ std::vector<std::uint32_t> choose_segments(const VisibilityMaps& maps, std::size
 /// Limited signed distances of one map, [row][column].
 class LimitedDistance {
  public:
-  LimitedDistance() : transform_(kN) {}
+  LimitedDistance() : transform_(kMapSize) {}
   void operator()(const SphericalMap& map, std::vector<float>& distance) const {
-    distance.resize(static_cast<std::size_t>(kN) * kN);
+    distance.resize(static_cast<std::size_t>(kMapSize) * kMapSize);
     transform_(map, distance.data());
     for (float& d : distance) d = std::clamp(d, -kLargestDistance, kLargestDistance);
   }
@@ -87,14 +87,14 @@ std::pair<Eigen::MatrixXd, Eigen::VectorXd> leading_eigenvectors(const Eigen::Ma
 
 SsdfVisibility fit_ssdf(const VisibilityMaps& maps, const VisibilitySettings& settings) {
   assert(maps.first_segment == 0);
-  const int rows = maps.both_sides ? kN : kN / 2 + kMarginRows;
-  const Eigen::Index cells = static_cast<Eigen::Index>(rows) * kN;
-  const auto all_cells = static_cast<std::size_t>(kN) * kN;
+  const int rows = maps.both_sides ? kMapSize : kMapSize / 2 + kMarginRows;
+  const Eigen::Index cells = static_cast<Eigen::Index>(rows) * kMapSize;
+  const auto all_cells = static_cast<std::size_t>(kMapSize) * kMapSize;
   const auto components = static_cast<std::size_t>(settings.components);
   const LimitedDistance limited_distance;
 
   SsdfVisibility ssdf;
-  ssdf.resolution = kN;
+  ssdf.resolution = kMapSize;
   ssdf.components = settings.components;
   ssdf.sees_nothing = maps.sees_nothing;
   ssdf.mean.assign(all_cells, -kLargestDistance);
@@ -118,11 +118,11 @@ SsdfVisibility fit_ssdf(const VisibilityMaps& maps, const VisibilitySettings& se
   std::copy(mean.data(), mean.data() + all_cells, ssdf.mean.begin());
 
   // Principal components of the weighted deviations, by way of their products with each other.
-  const LatLongGrid grid(kN);
+  const LatLongGrid grid(kMapSize);
   Eigen::RowVectorXf root_weight(cells);
   for (Eigen::Index cell = 0; cell < cells; ++cell) {
     root_weight[cell] =
-        static_cast<float>(std::sqrt(grid.solid_angle(static_cast<int>(cell / kN))));
+        static_cast<float>(std::sqrt(grid.solid_angle(static_cast<int>(cell / kMapSize))));
   }
   Samples weighted = samples.leftCols(cells);
   samples.resize(0, 0);
@@ -155,7 +155,7 @@ SsdfVisibility fit_ssdf(const VisibilityMaps& maps, const VisibilitySettings& se
     Eigen::VectorXf row_sum(projection.cols());
     for (Eigen::Index row = 0, cell = 0; row < rows; ++row) {
       row_sum.setZero();
-      for (int column = 0; column < kN; ++column, ++cell) {
+      for (int column = 0; column < kMapSize; ++column, ++cell) {
         row_sum += (distance[static_cast<std::size_t>(cell)] - mean[cell]) *
                    projection.row(cell).transpose();
       }

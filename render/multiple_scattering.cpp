@@ -37,9 +37,9 @@ constexpr int kAzimuths = 64;
 constexpr float kConesFrom = 8;
 constexpr float kConesAlone = 20;
 
-using Lanes = BcsdfTable::Lanes;
+using TableLanes = BcsdfTable::Lanes;
 using RgbLanes = BcsdfTable::RgbLanes;
-constexpr int kLanes = Lanes::SizeAtCompileTime;
+constexpr int kLanes = TableLanes::SizeAtCompileTime;
 constexpr int kAzimuthNodes = 2 * kLanes;
 
 // Points on the circle, and the Fourier series there.
@@ -178,8 +178,8 @@ Rgb MultipleScattering::outgoing_from_cones(const CellLight& incoming, const Lig
   const float along = std::clamp(axis.dot(bundle_tangent_[segment]), -1.0F, 1.0F);
   const float across = std::sqrt(1 - along * along);
   const Circle& points = circle();
-  std::array<Lanes, 2> theta_i;
-  std::array<Lanes, 2> cos_turn;
+  std::array<TableLanes, 2> theta_i;
+  std::array<TableLanes, 2> cos_turn;
   for (int n = 0; n < kAzimuthNodes; ++n) {
     const auto at = static_cast<std::size_t>(n);
     const Vec3 w = turn * Vec3(along, across * points.cosine[at], across * points.sine[at]);

@@ -24,7 +24,7 @@ constexpr int kBlockSamples = 8;
 constexpr int kBlocksPerReport = 64;
 
 /// Segment and cell of a pixel that sees no fiber.
-constexpr std::uint32_t kNone = 0xffffffffU;
+constexpr std::uint32_t kNoSegment = 0xffffffffU;
 
 void require(bool present, bool needed, const FabricPack& pack, const char* what) {
   if (present || !needed) return;
@@ -176,8 +176,8 @@ namespace {
 FrameBuffers empty_frame(int width, int height, int spp) {
   FrameBuffers frame(width, height);
   const std::size_t count = frame.pixel_count();
-  frame.segment.assign(count, kNone);
-  frame.cell.assign(count, kNone);
+  frame.segment.assign(count, kNoSegment);
+  frame.cell.assign(count, kNoSegment);
   frame.fabric_position.assign(count, Vec3::Zero());
   frame.depth.assign(count, 0.0F);
   frame.tangent.assign(count, Vec3::Zero());
@@ -257,8 +257,8 @@ class BlockPicture {
     }
     for (const SeenSurface& surface : g_buffer.surfaces) {
       const Vec2& place = surface.hit.point.position_mm;
-      store(surface.sample, kNone, kNone, surface.hit.position, Vec3(place.x(), place.y(), 0),
-            surface.hit.world_from_patch.col(0).cast<float>());
+      store(surface.sample, kNoSegment, kNoSegment, surface.hit.position,
+            Vec3(place.x(), place.y(), 0), surface.hit.world_from_patch.col(0).cast<float>());
     }
   }
 

@@ -15,7 +15,7 @@ constexpr int kMaxLobes = 128;
 
 /// Weak lobes are left out; all of them together carry less than this share of the light. The
 /// visibility of the lobes is itself good to some per cent.
-constexpr float kLeftOut = 3e-3F;
+constexpr float kLobesLeftOut = 3e-3F;
 
 /// A lobe of light whose deviation in azimuth is below this (radians of arc) is looked up once.
 constexpr float kNarrow = 0.1F;
@@ -75,7 +75,7 @@ Rgb SingleScattering::soft(const ShadingPoint& point, const DirectionPair& axis,
   const Mat3 to_fiber = frame_about(point.tangent.fabric).transpose();
   const Mat3 lobe_to_fiber = to_fiber * turn;
   const Vec3 wo = to_fiber * point.wo.fabric;
-  const float weak = kLeftOut * total / static_cast<float>(lobes);
+  const float weak = kLobesLeftOut * total / static_cast<float>(lobes);
   Rgb sum = Rgb::Zero();
   for (int q = 0; q < lobes; ++q) {
     if (!(carried[q] > weak)) continue;

@@ -1,19 +1,40 @@
 #!/usr/bin/env bash
-# Checks of the source text. Without arguments: clang-format on every file, which CI demands. With files, or --all: clang-tidy on
-# them, half a minute each (apt-get install clang-tidy-14).
+# Checks of the source text:
+#   tests/lint.sh                  clang-format on every file
+#   tests/lint.sh FILE…            clang-tidy on these .cpp files, half a minute each
+#   tests/lint.sh --all            clang-tidy on every .cpp file
+#   tests/lint.sh --since REV      clang-tidy on what changed since a revision; the .cpp file stands for its header. Up to 16 files:
+#                                  after larger changes use --all by hand
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
+most=16
+
 sources() { find formats fibers precompute render pipeline tests \( -name '*.cpp' -o -name '*.h' -o -name '*.c' \) -print | sort; }
 
-if [[ $# -eq 0 ]]; then
-  echo "clang-format"
-  sources | xargs clang-format-14 --dry-run --Werror
-  exit
-fi
+changed_since() {
+  git diff --name-only --diff-filter=d "$1" -- formats fibers precompute render pipeline tests | sed -n 's/\.h$/.cpp/p; /\.cpp$/p' |
+    sort -u | while read -r file; do if [[ -f $file ]]; then echo "$file"; fi; done
+}
 
-# Compile commands without precompiled headers, which are in GCC's own form.
-cmake --preset release -B build/tidy -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON >/dev/null
-if [[ $1 == --all ]]; then files=$(sources | grep '\.cpp$'); else files=$(printf '%s\n' "$@"); fi
+case ${1-} in
+  "")
+    echo "clang-format"
+    sources | xargs clang-format-14 --dry-run --Werror
+    exit ;;
+  --all) files=$(sources | grep '\.cpp$') ;;
+  --since)
+    files=$(changed_since "$2")
+    count=$(grep -c . <<<"$files" || true)
+    if [[ $count -gt $most ]]; then
+      echo "clang-tidy: $count files changed since $2, more than $most: not run"
+      exit
+    fi ;;
+  *) files=$(printf '%s\n' "$@") ;;
+esac
+[[ -n $files ]] || exit 0
+
+# Compile commands of each file alone, without precompiled headers, which are in GCC's own form.
+cmake --preset release -B build/tidy -D CMAKE_DISABLE_PRECOMPILE_HEADERS=ON -D CMAKE_UNITY_BUILD=OFF >/dev/null
 echo "clang-tidy on $(wc -l <<<"$files") files"
 xargs -P "$(nproc)" -n 1 clang-tidy-14 -p build/tidy --quiet --warnings-as-errors='*' <<<"$files" 2> >(grep -v 'warnings generated' >&2)

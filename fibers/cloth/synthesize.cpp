@@ -15,7 +15,7 @@ namespace heddle {
 namespace {
 
 // A point is stored as 3 floats, a segment as two indices; writing copies them twice.
-constexpr double kBytesPerSegment = 3 * 20;
+constexpr double kPointBytesPerSegment = 3 * 20;
 constexpr double kMostSegments = 0x1p31;
 
 }  // namespace
@@ -29,7 +29,7 @@ ExemplarForecast forecast_exemplar(const FabricConfig& config) {
   };
   const double segments = segments_of(config.warp, ends, picks * config.weft.spacing_mm) +
                           segments_of(config.weft, picks, ends * config.warp.spacing_mm);
-  return {segments, kBytesPerSegment * segments};
+  return {segments, kPointBytesPerSegment * segments};
 }
 
 Exemplar synthesize(const FabricConfig& config, const std::function<void()>& yarn_done) {

@@ -25,7 +25,7 @@ struct Weave {
   bool is_warp_up(int end, int pick) const {
     const int e = ((end % ends) + ends) % ends;
     const int p = ((pick % picks) + picks) % picks;
-    return warp_up[static_cast<std::size_t>(p * ends + e)] != 0;
+    return warp_up[static_cast<std::size_t>(p) * ends + e] != 0;
   }
 };
 

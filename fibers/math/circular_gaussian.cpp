@@ -17,8 +17,6 @@
 namespace heddle {
 namespace {
 
-constexpr double kHalfPi = 0.5 * kPi;
-
 // Beyond that many widths a Gaussian holds 2e-8 of itself.
 constexpr double kReach = 4;
 

@@ -108,7 +108,6 @@ void ShRotation::rotate(const T* in, T* out) const {
     a[static_cast<std::size_t>(j)] = value;
   }
 
-  const SwapMatrix<T>& matrix = swap_matrix<T>();
   // Rotation about z: Y_{l,m} and Y_{l,-m} of the turned direction.
   const auto turn_about_z = [this](std::array<Value, kCount>& v, const Turn& turn) {
     for (int l = 1; l <= order_; ++l) {
@@ -123,8 +122,8 @@ void ShRotation::rotate(const T* in, T* out) const {
       }
     }
   };
-  const auto swap = [&matrix, count](const std::array<Value, kCount>& from,
-                                     std::array<Value, kCount>& to) {
+  const auto swap = [count](const std::array<Value, kCount>& from, std::array<Value, kCount>& to) {
+    const SwapMatrix<T>& matrix = swap_matrix<T>();
     for (int j = 0; j < count; ++j) {
       const auto row = static_cast<std::size_t>(j);
       Value sum = Value::Zero();

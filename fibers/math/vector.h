@@ -17,6 +17,7 @@ using Rgb = Eigen::Array3f;
 using Rgbd = Eigen::Array3d;
 
 inline constexpr double kPi = 3.14159265358979323846;
+inline constexpr double kHalfPi = 0.5 * kPi;
 inline constexpr float kPif = 3.14159265358979323846F;
 
 constexpr double radians(double degrees) {

@@ -13,7 +13,7 @@
 namespace heddle {
 namespace {
 
-constexpr float kHalfPi = 0.5F * kPif;
+constexpr float kHalfPif = 0.5F * kPif;
 constexpr int kEndRows = 512;
 // deviations from an end beyond which the cut leaves Gn as it is (to 1e-10)
 constexpr double kEndReach = 6.5;
@@ -55,13 +55,13 @@ struct RowPosition {
 };
 
 RowPosition row_position(float theta_o) {
-  const float position = (theta_o + kHalfPi) * ((BcsdfTable::kRows - 1) / kPif);
+  const float position = (theta_o + kHalfPif) * ((BcsdfTable::kRows - 1) / kPif);
   const int row = std::clamp(static_cast<int>(position), 0, BcsdfTable::kRows - 2);
   return {row, std::clamp(position - static_cast<float>(row), 0.0F, 1.0F)};
 }
 
 // (1 - cosine)^5 with 1 - cosine = sine^2 / (1 + cosine), accurate where it is small.
-float schlick_weight(float sine, float cosine) {
+float schlick_weight_of_sine(float sine, float cosine) {
   const float drop = sine * sine / (1.0F + cosine);
   return drop * drop * (drop * drop) * drop;
 }
@@ -81,17 +81,17 @@ struct BcsdfTable::Inclination {
       : cosine(std::sqrt(w.y() * w.y() + w.z() * w.z())), sine(w.x()) {
     if (cosine < 0.7F) {
       from_end = std::asin(cosine);
-      theta = std::copysign(kHalfPi - from_end, w.x());
+      theta = std::copysign(kHalfPif - from_end, w.x());
     } else {
       theta = std::asin(std::clamp(w.x(), -1.0F, 1.0F));
-      from_end = kHalfPi - std::abs(theta);
+      from_end = kHalfPif - std::abs(theta);
     }
     azimuth = cosine > 0.0F ? Vec2(w.y() / cosine, w.z() / cosine) : Vec2(1.0F, 0.0F);
   }
 
   Inclination(float angle, const Vec2& around)
       : theta(angle),
-        from_end(kHalfPi - std::abs(angle)),
+        from_end(kHalfPif - std::abs(angle)),
         cosine(std::sin(from_end)),
         sine(std::sin(angle)),
         azimuth(around) {}
@@ -206,7 +206,7 @@ BcsdfTable::Densities BcsdfTable::densities(const Inclination& in, const Inclina
 Rgb BcsdfTable::value(const Densities& d, const Inclination& in) const {
   const float r = d.r / r_.cos2_mean(in.cosine, in.from_end);
   const float tt = d.tt / tt_.cos2_mean(in.cosine, in.from_end);
-  const float schlick = schlick_weight(in.sine, in.cosine);
+  const float schlick = schlick_weight_of_sine(in.sine, in.cosine);
   return color_r_ * r + (1.0F - color_r_) * (schlick * r + (1.0F - schlick) * tt * color_tt_);
 }
 
@@ -321,8 +321,8 @@ struct BcsdfTable::SgNodes {
     if (0.5F * total < static_cast<float>(kBroadPrecision)) {
       static const QuadratureRule& base = gauss_legendre(kBroadNodes);
       for (std::size_t n = 0; n < base.nodes.size(); ++n) {
-        const float theta = kHalfPi * static_cast<float>(base.nodes[n]);
-        add(theta - light.theta, theta + view.theta, kHalfPi * static_cast<float>(base.weights[n]),
+        const float theta = kHalfPif * static_cast<float>(base.nodes[n]);
+        add(theta - light.theta, theta + view.theta, kHalfPif * static_cast<float>(base.weights[n]),
             0.0F);
       }
       return;
@@ -333,7 +333,7 @@ struct BcsdfTable::SgNodes {
     const float centre = light.theta + light_offset;
     const float root = std::sqrt(0.5F * total);
     const float scale = std::copysign(1.0F / root, centre);
-    const ThreeNodeRule rule = cut_rule(static_cast<double>(root * (kHalfPi - std::abs(centre))));
+    const ThreeNodeRule rule = cut_rule(static_cast<double>(root * (kHalfPif - std::abs(centre))));
     for (std::size_t n = 0; n < 3; ++n) {
       const auto x = static_cast<float>(rule.nodes[n]);
       add(light_offset + scale * x, cone_offset + scale * x,
@@ -374,7 +374,7 @@ BcsdfTable::SgSums BcsdfTable::sg_sums(const Inclination& light, float sharpness
       k[lane] = is_r ? 0.0F : k_;
     }
     const Lanes half_sine = (0.5F * d_light).sin();
-    const Lanes from_end = (kHalfPi - (light.theta + d_light).abs()).max(0.0F);
+    const Lanes from_end = (kHalfPif - (light.theta + d_light).abs()).max(0.0F);
     const Lanes cosine = from_end.sin();
     // B as in sg_scatter.cpp; with k = 0 TT's azimuth integral becomes R's.
     const Lanes a = (sharpness * light.cosine) * cosine;
@@ -430,14 +430,14 @@ Rgb BcsdfTable::blurred_scatter(const Lanes& theta_i, const Lanes& cos_turn, flo
   // Each lobe without its colours: value, and value times Schlick's weight.
   const auto lobe_response = [&](const LongitudinalLobe& lobe, Lanes& schlick) {
     const float total = variance + lobe.beta * lobe.beta;
-    const Lanes theta = (theta_i - from_cone * (variance / total)).max(-kHalfPi).min(kHalfPi);
+    const Lanes theta = (theta_i - from_cone * (variance / total)).max(-kHalfPif).min(kHalfPif);
     const Lanes cosine = theta.cos().max(0.0F);
     const Lanes drop = 1.0F - cosine;
     schlick = drop.square().square() * drop;
     Lanes response =
         (from_cone.square() * (-0.5F / total)).exp() * cosine * (1 / std::sqrt(2 * kPif * total));
     for (int lane = 0; lane < Lanes::SizeAtCompileTime; ++lane) {
-      response[lane] /= lobe.cos2_mean(cosine[lane], kHalfPi - std::abs(theta[lane]));
+      response[lane] /= lobe.cos2_mean(cosine[lane], kHalfPif - std::abs(theta[lane]));
     }
     return response;
   };

@@ -11,8 +11,6 @@
 namespace heddle {
 namespace {
 
-constexpr double kHalfPi = 0.5 * kPi;
-
 // exp(-d^2 / (2 beta^2)) / (sqrt(2 pi) beta Gn): M of the header.
 double longitudinal(double theta_i, double theta_o, double beta) {
   const double deviation = (theta_i + theta_o) / beta;

@@ -11,8 +11,6 @@
 namespace heddle {
 namespace {
 
-constexpr double kHalfPi = 0.5 * kPi;
-
 Eigen::Vector2d azimuth(const Vec3d& direction, double cosine) {
   return cosine > 0.0 ? Eigen::Vector2d(direction.y() / cosine, direction.z() / cosine)
                       : Eigen::Vector2d(1.0, 0.0);

@@ -6,7 +6,7 @@
 // docs/chart-schema.json. Tested in tests/pipeline/chart_test.cpp.
 
 #include <filesystem>
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <span>
 #include <string>

@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <nlohmann/json.hpp>
+
 #include "formats/atomic_file.h"
 #include "pipeline/chart/chart_page.h"
 #include "pipeline/chart/xml_text.h"

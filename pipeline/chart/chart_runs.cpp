@@ -28,7 +28,7 @@ constexpr Rungs kPathRungs{kPathSamples, kQuickPathSamples};
 constexpr Rungs kUsualRungs{kSamples, kQuickSamples};
 constexpr Rungs kRivalRungs{kRivalSamples, {}};
 
-enum class Place : std::uint8_t {
+enum class CurvePlace : std::uint8_t {
   kFirst,  // in every chart
   kRival,  // behind the settings (docs/rivals.md), where some cloth has fibers
 };
@@ -37,7 +37,7 @@ enum class Place : std::uint8_t {
 struct Ladder {
   RenderMethod method;
   Rungs rungs;
-  Place place = Place::kFirst;
+  CurvePlace place = CurvePlace::kFirst;
 };
 
 /// One row per method, in the order of the chart.
@@ -45,12 +45,12 @@ constexpr std::array<Ladder, kRenderMethodCount> kLadders = {{
     {RenderMethod::kPath, kPathRungs},
     {RenderMethod::kExact, kUsualRungs},
     {RenderMethod::kVolume, kUsualRungs},
-    {RenderMethod::kPrinted, kRivalRungs, Place::kRival},
-    {RenderMethod::kPrt, kRivalRungs, Place::kRival},
-    {RenderMethod::kTsaiShih16, kRivalRungs, Place::kRival},
-    {RenderMethod::kTsaiShihFull, kRivalRungs, Place::kRival},
-    {RenderMethod::kDualScattering, kRivalRungs, Place::kRival},
-    {RenderMethod::kPath6, kRivalRungs, Place::kRival},
+    {RenderMethod::kPrinted, kRivalRungs, CurvePlace::kRival},
+    {RenderMethod::kPrt, kRivalRungs, CurvePlace::kRival},
+    {RenderMethod::kTsaiShih16, kRivalRungs, CurvePlace::kRival},
+    {RenderMethod::kTsaiShihFull, kRivalRungs, CurvePlace::kRival},
+    {RenderMethod::kDualScattering, kRivalRungs, CurvePlace::kRival},
+    {RenderMethod::kPath6, kRivalRungs, CurvePlace::kRival},
 }};
 
 constexpr bool holds_every_method_once() {
@@ -69,7 +69,7 @@ class RunTable {
   RunTable(const SceneConfig& scene, const PictureRequest& base, const ChartLadders& ladders)
       : scene_(&scene), base_(&base), ladders_(ladders) {}
 
-  void add_methods(Place place) {
+  void add_methods(CurvePlace place) {
     for (const Ladder& ladder : kLadders) {
       if (ladder.place != place) continue;
       const std::string name = render_method_name(ladder.method);
@@ -182,7 +182,7 @@ std::vector<ChartRun> chart_runs(const SceneConfig& scene, const PictureRequest&
     return std::any_of(scene.cloths.begin(), scene.cloths.end(), condition);
   };
   RunTable table(scene, base, ladders);
-  table.add_methods(Place::kFirst);
+  table.add_methods(CurvePlace::kFirst);
   if (any_cloth(
           [](const ClothConfig& cloth) { return cloth.surface && cloth.surface->interactive; }))
     table.add_surface_methods();
@@ -191,7 +191,7 @@ std::vector<ChartRun> chart_runs(const SceneConfig& scene, const PictureRequest&
     table.add_settings_of_transfer();
     table.add_forms_of_visibility();
     table.add_resolutions_of_the_volume();
-    table.add_methods(Place::kRival);
+    table.add_methods(CurvePlace::kRival);
   }
   return table.take();
 }

@@ -62,7 +62,7 @@ std::string percent_text(double value) {
   return fmt::format("{:g} %", 100 * value);
 }
 
-std::string seconds_text(double value) {
+std::string tick_text(double value) {
   if (value < 0.9995) return fmt::format("{:g} ms", 1000 * value);
   return fmt::format("{:g} s", value);
 }
@@ -181,7 +181,7 @@ class ChartDrawing {
                       tick.labelled ? "#d5d5d5" : "#efefef"));
       if (!tick.labelled) continue;
       add(fmt::format(R"(<text x="{:.1f}" y="{:.1f}" text-anchor="middle">{}</text>)", x,
-                      bottom + 18, seconds_text(tick.value)));
+                      bottom + 18, tick_text(tick.value)));
     }
     for (const Tick& tick : ticks_of(error_axis_)) {
       const double y = error_axis_.place(tick.value);

@@ -17,11 +17,9 @@
 namespace heddle {
 namespace {
 
-using Json = nlohmann::json;
-
 struct Quantity {
   const char* name;
-  Json (*evaluate)(EvalObject&);
+  nlohmann::json (*evaluate)(EvalObject&);
 };
 
 constexpr Quantity kQuantities[] = {
@@ -130,8 +128,8 @@ class FieldScanner {
     const std::size_t start = at_;
     skip_string();
     try {
-      return Json::parse(line_.substr(start, at_ - start)).get<std::string>();
-    } catch (const Json::exception&) {
+      return nlohmann::json::parse(line_.substr(start, at_ - start)).get<std::string>();
+    } catch (const nlohmann::json::exception&) {
       at_ = start;
       fail("bad field name");
     }
@@ -157,24 +155,24 @@ class FieldScanner {
 };
 
 // A field's value. Objects inside it may not name a field twice either.
-Json parse_value(const Field& field) {
+nlohmann::json parse_value(const Field& field) {
   std::vector<std::set<std::string>> names;
   std::string duplicate;
-  const auto watch = [&](int, Json::parse_event_t event, Json& parsed) {
-    if (event == Json::parse_event_t::object_start) names.emplace_back();
-    if (event == Json::parse_event_t::object_end) names.pop_back();
-    if (event == Json::parse_event_t::key &&
+  const auto watch = [&](int, nlohmann::json::parse_event_t event, nlohmann::json& parsed) {
+    if (event == nlohmann::json::parse_event_t::object_start) names.emplace_back();
+    if (event == nlohmann::json::parse_event_t::object_end) names.pop_back();
+    if (event == nlohmann::json::parse_event_t::key &&
         !names.back().insert(parsed.get<std::string>()).second) {
       duplicate = parsed.get<std::string>();
     }
     return true;
   };
-  Json value;
+  nlohmann::json value;
   try {
-    value = Json::parse(field.text, watch);
-  } catch (const Json::parse_error&) {
+    value = nlohmann::json::parse(field.text, watch);
+  } catch (const nlohmann::json::parse_error&) {
     throw UnreadableLine("field \"" + field.name + "\": not valid JSON");
-  } catch (const Json::out_of_range&) {
+  } catch (const nlohmann::json::out_of_range&) {
     throw EvalError("field \"" + field.name + "\": the number is not finite in double precision");
   }
   if (!duplicate.empty())
@@ -182,17 +180,17 @@ Json parse_value(const Field& field) {
   return value;
 }
 
-bool all_finite(const Json& value) {
+bool all_finite(const nlohmann::json& value) {
   if (value.is_structured()) return std::all_of(value.begin(), value.end(), all_finite);
   return !value.is_number_float() || std::isfinite(value.get<double>());
 }
 
-Json evaluate(const Json& request) {
+nlohmann::json evaluate(const nlohmann::json& request) {
   EvalObject object(request, "");
   const std::string name = object.string("quantity");
   for (const Quantity& quantity : kQuantities) {
     if (name == quantity.name) {
-      Json value = quantity.evaluate(object);
+      nlohmann::json value = quantity.evaluate(object);
       if (!all_finite(value))
         throw EvalError("the value of \"" + name + "\" is not finite for these fields");
       return value;
@@ -237,11 +235,11 @@ Answer answer_line(const std::string& line) {
       if (field.name != "id") continue;
       id = field.text;
     }
-    Json request = Json::object();
+    nlohmann::json request = nlohmann::json::object();
     std::string error;
     for (const Field& field : fields) {
       try {
-        Json value = parse_value(field);
+        nlohmann::json value = parse_value(field);
         if (field.name != "id") request[field.name] = std::move(value);
       } catch (const UnreadableLine&) {
         throw;
@@ -256,12 +254,13 @@ Answer answer_line(const std::string& line) {
       throw EvalError("duplicate field \"" + duplicate + "\"");
     }
     if (!error.empty()) throw EvalError(error);
-    const Json value = evaluate(request);
+    const nlohmann::json value = evaluate(request);
     return {answer_text(id, "value", value.dump()), true};
   } catch (const EvalError& e) {
     if (dynamic_cast<const UnreadableLine*>(&e) != nullptr) id = "null";
     // Parts of a line may be invalid UTF-8, which an answer must not repeat.
-    const std::string message = Json(e.what()).dump(-1, ' ', false, Json::error_handler_t::replace);
+    const std::string message =
+        nlohmann::json(e.what()).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
     return {answer_text(id, "error", message), false};
   }
 }

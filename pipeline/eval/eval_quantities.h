@@ -4,7 +4,7 @@
 // value. A new one is declared here, defined in the file of its family and listed in the table of
 // eval.cpp and in docs/eval.md.
 
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 
 #include "pipeline/eval/eval_request.h"
 

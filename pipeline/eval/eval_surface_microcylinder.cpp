@@ -9,23 +9,21 @@
 namespace heddle {
 namespace {
 
-using Json = nlohmann::json;
-
 /// The same value in TOML, which writes strings, numbers and arrays as JSON does.
-std::string toml_value(const Json& value, const EvalObject& request) {
+std::string toml_value(const nlohmann::json& value, const EvalObject& request) {
   if (value.is_null()) request.fail("fabric", "holds a null");
   if (!value.is_structured()) return value.dump();
   std::string text;
   for (const auto& [key, item] : value.items()) {
     if (!text.empty()) text += ", ";
-    if (value.is_object()) text += Json(key).dump() + " = ";
+    if (value.is_object()) text += nlohmann::json(key).dump() + " = ";
     text += toml_value(item, request);
   }
   return value.is_object() ? "{" + text + "}" : "[" + text + "]";
 }
 
 TomlTable read_fabric(EvalObject& request) {
-  const Json& value = request.value("fabric");
+  const nlohmann::json& value = request.value("fabric");
   if (value.is_string()) {
     const std::vector<std::string> known = surface_preset_names("microcylinder");
     if (std::find(known.begin(), known.end(), value.get<std::string>()) == known.end()) {
@@ -39,7 +37,7 @@ TomlTable read_fabric(EvalObject& request) {
   if (!value.is_object()) request.fail("fabric", "expected a name or an object");
   std::string text;
   for (const auto& [key, item] : value.items()) {
-    text += Json(key).dump() + " = " + toml_value(item, request) + "\n";
+    text += nlohmann::json(key).dump() + " = " + toml_value(item, request) + "\n";
   }
   return TomlTable::parse(text, "fabric");
 }
@@ -52,13 +50,13 @@ Rgbd read_albedo(EvalObject& thread) {
   return {albedo[0], albedo[1], albedo[2]};
 }
 
-Json list_of(const Rgbd& value) {
+nlohmann::json list_of(const Rgbd& value) {
   return {value[0], value[1], value[2]};
 }
 
 }  // namespace
 
-Json eval_thread(EvalObject& request) {
+nlohmann::json eval_thread(EvalObject& request) {
   EvalObject thread = request.object("thread");
   ThreadParameters parameters;
   parameters.ior = thread.number("ior", 1, 4);
@@ -75,7 +73,7 @@ Json eval_thread(EvalObject& request) {
   return list_of(ThreadScattering(parameters, {}).value(theta_i, phi_i, theta_o, phi_o));
 }
 
-Json eval_microcylinder(EvalObject& request) {
+nlohmann::json eval_microcylinder(EvalObject& request) {
   const Vec3d wi = request.direction("wi");
   const Vec3d wo = request.direction("wo");
   request.value("fabric");

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <nlohmann/json.hpp>
 #include <set>
 
 #include "pipeline/console.h"
@@ -15,11 +16,11 @@ using Json = nlohmann::ordered_json;
 double root(double square) {
   return std::sqrt(std::max(0.0, square));
 }
-std::string percent(double value) {
+std::string percent_text(double value) {
   return fmt::format("{:.3g} %", 100 * value);
 }
 /// Shorter than duration_text allows.
-std::string seconds_text(double seconds) {
+std::string short_duration(double seconds) {
   return seconds < 9.95 ? fmt::format("{:.2g} s", seconds) : duration_text(seconds);
 }
 
@@ -126,18 +127,19 @@ std::string why(const ScenePlan& plan, const Way& way) {
         root(way.candidate.bias_square.value) > 0.7 * plan.question.target.tolerance;
     return by_bias ? "too far from path tracing" : "too many samples";
   }
-  return fmt::format("{} spp, {}", made->spp, seconds_text(made->seconds));
+  return fmt::format("{} spp, {}", made->spp, short_duration(made->seconds));
 }
 
 }  // namespace
 
 std::string plan_text(const ScenePlan& plan) {
   const PlanQuestion& question = plan.question;
-  std::string text = fmt::format(
-      "plan      {}{}, relative RMSE at most {}, {}\n", plan.scene.name,
-      question.view.empty() ? "" : ", view " + question.view, percent(question.target.tolerance),
-      question.target.pictures == 1 ? "one picture"
-                                    : fmt::format("{} pictures", question.target.pictures));
+  std::string text = fmt::format("plan      {}{}, relative RMSE at most {}, {}\n", plan.scene.name,
+                                 question.view.empty() ? "" : ", view " + question.view,
+                                 percent_text(question.target.tolerance),
+                                 question.target.pictures == 1
+                                     ? "one picture"
+                                     : fmt::format("{} pictures", question.target.pictures));
   if (plan.chosen) {
     const Way& way = plan.ways[*plan.chosen];
     text +=
@@ -156,30 +158,30 @@ std::string plan_text(const ScenePlan& plan) {
                           visibility_of(way, light));
     }
     text += fmt::format("error     {} expected: {} apart from noise ({}), {} noise\n",
-                        percent(plan.offer->expected_error),
-                        percent(root(way.candidate.bias_square.value)),
+                        percent_text(plan.offer->expected_error),
+                        percent_text(root(way.candidate.bias_square.value)),
                         traces_paths(way.settings.method) && family_of(way.settings) == "path"
                             ? "none by definition"
                         : way.tried ? "table and pilot"
                                     : "table",
-                        percent(root(way.candidate.noise_square.value / plan.offer->spp)));
-    text +=
-        fmt::format("cost      {}: {} to build, {} per picture; the plan took {}\n",
-                    seconds_text(plan.offer->seconds), seconds_text(way.candidate.build_seconds),
-                    seconds_text(plan.offer->seconds_per_picture), seconds_text(plan.time.seconds));
+                        percent_text(root(way.candidate.noise_square.value / plan.offer->spp)));
+    text += fmt::format(
+        "cost      {}: {} to build, {} per picture; the plan took {}\n",
+        short_duration(plan.offer->seconds), short_duration(way.candidate.build_seconds),
+        short_duration(plan.offer->seconds_per_picture), short_duration(plan.time.seconds));
   } else {
     text +=
         fmt::format("choice    none: no way meets this tolerance; the best that can be had is {}\n",
-                    percent(plan.best_tolerance));
+                    percent_text(plan.best_tolerance));
   }
   const char* label = "why";
   for (const Way* way : notable(plan)) {
     text += fmt::format(
         "{:<9} {}: apart from noise {}, noise {} / sqrt(spp), {} per spp, {} to build: {}\n", label,
-        way->candidate.name, percent(root(way->candidate.bias_square.value)),
-        percent(root(way->candidate.noise_square.value)),
-        seconds_text(way->candidate.seconds_per_spp), seconds_text(way->candidate.build_seconds),
-        why(plan, *way));
+        way->candidate.name, percent_text(root(way->candidate.bias_square.value)),
+        percent_text(root(way->candidate.noise_square.value)),
+        short_duration(way->candidate.seconds_per_spp),
+        short_duration(way->candidate.build_seconds), why(plan, *way));
     label = "";
   }
   if (!plan.note.empty()) text += fmt::format("note      {}\n", plan.note);

@@ -18,7 +18,7 @@ constexpr int kProductOrder = 2 * PrtScattering::kOrder;
 // V, light and incoming harmonic together have degree 20: Gauss's rule needs 11 heights, the
 // azimuth 21 steps.
 constexpr int kHeights = kProductOrder + 1;
-constexpr int kAzimuths = 2 * kProductOrder + 1;
+constexpr int kProductAzimuths = 2 * kProductOrder + 1;
 
 /// [coefficient, direction]
 Eigen::MatrixXf harmonics_at(int order, const std::vector<Vec3d>& directions) {
@@ -44,10 +44,10 @@ PrtScattering::PrtScattering(const SsdfVisibility& ssdf, bool both_sides,
   for (std::size_t i = 0; i < heights.nodes.size(); ++i) {
     const double z = heights.nodes[i];
     const double radius = std::sqrt(1 - z * z);
-    for (int k = 0; k < kAzimuths; ++k) {
-      const double azimuth = 2 * kPi * k / kAzimuths;
+    for (int k = 0; k < kProductAzimuths; ++k) {
+      const double azimuth = 2 * kPi * k / kProductAzimuths;
       nodes.emplace_back(radius * std::cos(azimuth), radius * std::sin(azimuth), z);
-      node_weights.push_back(heights.weights[i] * 2 * kPi / kAzimuths);
+      node_weights.push_back(heights.weights[i] * 2 * kPi / kProductAzimuths);
     }
   }
   harmonics_ = harmonics_at(kOrder, nodes);

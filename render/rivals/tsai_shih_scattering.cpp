@@ -14,7 +14,7 @@ namespace heddle {
 namespace {
 
 // Lobes that carry less than this share of the light are left out.
-constexpr float kLeftOut = 1e-3F;
+constexpr float kTermsLeftOut = 1e-3F;
 
 }  // namespace
 
@@ -102,7 +102,7 @@ Rgb TsaiShihScattering::spherical_gaussian(const ShadingPoint& point, const Dire
   const Vec3 wo = to_fiber * point.wo.fabric;
   Rgb sum = Rgb::Zero();
   for (std::size_t q = 0; q < axes_.size(); ++q) {
-    if (!(carried[q] > kLeftOut * most)) continue;
+    if (!(carried[q] > kTermsLeftOut * most)) continue;
     const Vec3 product = kSharpness * axes_[q] + sharpness * axis.fabric;
     const float n = product.norm();
     sum += carried[q] * factors_[point.material].response(to_fiber * (product / n), n, wo);

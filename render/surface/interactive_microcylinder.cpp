@@ -15,8 +15,6 @@
 namespace heddle {
 namespace {
 
-constexpr double kHalfPi = 0.5 * kPi;
-
 // Nodes per angle over which smooth factors are averaged.
 constexpr int kSide = 4;
 using Nodes = Eigen::Array<double, kSide, 1>;
@@ -391,7 +389,7 @@ struct InteractiveMicrocylinder::LightLanes {
 namespace {
 
 // The part of all estimates that shade() leaves out at most.
-constexpr float kLeftOut = 1e-3F;
+constexpr float kEstimatesLeftOut = 1e-3F;
 
 Float8 reflectance8(float ior, Float8 cosine) {
   const Float8 refracted = sqrt8(ior * ior - 1 + cosine * cosine);
@@ -639,7 +637,7 @@ Rgbd InteractiveMicrocylinder::shade(const Mat3d& frame, const Vec3d& wo,
   }
   if (count == 0 || !(total > 0)) return radiance;
 
-  const float least = kLeftOut * total / static_cast<float>(count);
+  const float least = kEstimatesLeftOut * total / static_cast<float>(count);
   const WeightingTable::Outgoing outgoing = table_.outgoing(out);
   for (std::size_t t = 0; t < tangents_.size(); ++t) {
     terms[t].keep_from(least);

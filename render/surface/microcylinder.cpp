@@ -14,8 +14,8 @@
 namespace heddle {
 namespace {
 
-constexpr int kLanes = 8;  // tangents computed at once
-using Tangents = Lanes<kLanes>;
+constexpr int kTangentLanes = 8;  // tangents computed at once
+using Tangents = Lanes<kTangentLanes>;
 
 // Panels of a ramp: eight Gauss-Legendre points on a panel of three deviations of a Gaussian leave
 // 4e-9 of its peak.
@@ -33,7 +33,7 @@ struct LocalDirection {
         psi(std::atan2(along, up)) {}
 
   /// In the frames of the thread's tangents at the given angles from the cloth.
-  ThreadDirection<kLanes> at(const Tangents& sine, const Tangents& cosine) const {
+  ThreadDirection<kTangentLanes> at(const Tangents& sine, const Tangents& cosine) const {
     return {along * cosine + up * sine, Tangents::Constant(across), up * cosine - along * sine};
   }
 
@@ -126,9 +126,9 @@ namespace {
 template <typename Batch>
 std::vector<Batch> batches_of(const std::vector<TangentPiece>& atoms) {
   std::vector<Batch> batches;
-  for (std::size_t first = 0; first < atoms.size(); first += kLanes) {
+  for (std::size_t first = 0; first < atoms.size(); first += kTangentLanes) {
     Batch batch{Tangents::Zero(), Tangents::Zero(), Tangents::Ones(), Tangents::Zero()};
-    for (std::size_t k = 0; k < kLanes && first + k < atoms.size(); ++k) {
+    for (std::size_t k = 0; k < kTangentLanes && first + k < atoms.size(); ++k) {
       const auto lane = static_cast<Eigen::Index>(k);
       batch.angle[lane] = atoms[first + k].begin;
       batch.sine[lane] = std::sin(atoms[first + k].begin);
@@ -181,20 +181,20 @@ CurveMeans Microcylinder::Thread::means(const Vec3d& wi, const Vec3d& wo, int re
   const double u_psi = std::exp(blend_exponent * psi_d * psi_d);
   CurveMeans sum;
   const auto add = [&](const Tangents& sine, const Tangents& cosine, const Tangents& weight) {
-    ThreadDirection<kLanes> i = in.at(sine, cosine);
-    ThreadDirection<kLanes> r = out.at(sine, cosine);
+    ThreadDirection<kTangentLanes> i = in.at(sine, cosine);
+    ThreadDirection<kTangentLanes> r = out.at(sine, cosine);
     // M = P = 0 where either looks at the back of the local surface. Clamped there, so that 0 is
     // not multiplied by infinity.
     const auto facing = i.normal > 0 && r.normal > 0;
     Tangents w = facing.select(weight, 0.0);
     i.normal = i.normal.max(1e-60);
     r.normal = r.normal.max(1e-60);
-    const ThreadAngles<kLanes> angles = thread_angles<kLanes>(i, r);
+    const ThreadAngles<kTangentLanes> angles = thread_angles<kTangentLanes>(i, r);
     w *= blended(u_psi, i.normal / in.length, r.normal / out.length);
     sum.projected += w.sum();
     const Tangents u_phi = (blend_exponent * angles.phi_d_squared).exp();
     w *= blended(u_phi, angles.cos_phi_i, angles.cos_phi_r) * angles.cos_theta_i;
-    const ThreadValue<kLanes> f = scattering.value<kLanes>(angles);
+    const ThreadValue<kTangentLanes> f = scattering.value<kTangentLanes>(angles);
     sum.surface += (w * f.surface).sum();
     sum.volume += (w * f.volume).sum();
   };
@@ -214,7 +214,7 @@ CurveMeans Microcylinder::Thread::means(const Vec3d& wi, const Vec3d& wo, int re
   // angle.
   const double specular = -std::atan2(in.along + out.along, in.up + out.up);
 
-  static const QuadratureRule& rule = gauss_legendre(kLanes);
+  static const QuadratureRule& rule = gauss_legendre(kTangentLanes);
   static const Tangents nodes = Eigen::Map<const Tangents>(rule.nodes.data());
   static const Tangents weights = Eigen::Map<const Tangents>(rule.weights.data());
   for (const TangentPiece& ramp : ramps) {
@@ -429,7 +429,7 @@ Rgbd Microcylinder::reflected_sg(const SurfacePoint& point, const Vec3d& axis, d
 /// -theta_o, cos phi_i / 2 in phi_i.
 struct Microcylinder::Lobes {
   Lobes(const Thread& thread, const Thread::Batch& batch, const LocalDirection& wo) {
-    const ThreadDirection<kLanes> out = wo.at(batch.sine, batch.cosine);
+    const ThreadDirection<kTangentLanes> out = wo.at(batch.sine, batch.cosine);
     const ThreadParameters& parameters = thread.scattering.parameters();
     const Tangents normal = out.normal.max(0.0);
     const Tangents cos_theta = (normal.square() + out.binormal.square()).sqrt().max(1e-6);
@@ -438,8 +438,8 @@ struct Microcylinder::Lobes {
     // What each sends to wo, roughly: only noise depends on it. The square root of what is seen of
     // a tangent, because 1/Q makes up for it under light that few tangents meet.
     const Tangents seen = thread.share * batch.weight * (normal / wo.length).sqrt() * cos_phi;
-    const Tangents reflected =
-        fresnel_reflectance<kLanes>(parameters.ior, cos_theta * (0.5 * (1 + cos_phi)).sqrt());
+    const Tangents reflected = fresnel_reflectance<kTangentLanes>(
+        parameters.ior, cos_theta * (0.5 * (1 + cos_phi)).sqrt());
     const Tangents inside =
         seen * (1 - reflected).square() * (parameters.albedo.maxCoeff() / (0.5 + 0.5 * cos_theta));
     // The highest direction of the mirror cone, theta_i = -theta_o, stands this far above the
@@ -457,12 +457,12 @@ struct Microcylinder::Lobes {
   }
 
   static Tangents inclination(const Tangents& tangent, const Tangents& cos_theta) {
-    return tangent.sign() * angle_of_half_tangent<kLanes>(tangent.abs() / (1 + cos_theta));
+    return tangent.sign() * angle_of_half_tangent<kTangentLanes>(tangent.abs() / (1 + cos_theta));
   }
 
   /// Sum of all lobes' densities at wi (1/sr), each times what it sends.
   double density(const Thread& thread, const Thread::Batch& batch, const LocalDirection& wi) const {
-    const ThreadDirection<kLanes> in = wi.at(batch.sine, batch.cosine);
+    const ThreadDirection<kTangentLanes> in = wi.at(batch.sine, batch.cosine);
     const Tangents cos_theta_squared = (in.normal.square() + in.binormal.square()).max(1e-12);
     const Tangents from_cone = inclination(in.tangent, cos_theta_squared.sqrt()) + theta_o;
     const auto gaussian = [&](double deviation) -> Tangents {
@@ -547,7 +547,7 @@ std::optional<SurfaceSample> Microcylinder::sample(const SurfacePoint& point, co
         left -= lobes.total;
         continue;
       }
-      for (Eigen::Index k = 0; k < kLanes && left >= 0; ++k) {
+      for (Eigen::Index k = 0; k < kTangentLanes && left >= 0; ++k) {
         if (lobes.surface[k] + lobes.volume[k] == 0) continue;
         wi = draw(thread, batch, lobes, k,
                   left < lobes.surface[k] ? thread.surface_lobe : thread.volume_lobe);

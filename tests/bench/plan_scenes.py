@@ -5,18 +5,16 @@ chart's path-traced reference, and its cost beside the cheapest run of the chart
     tests/bench/plan_scenes.py build/release/heddle [FOLDER] [-o OUT] [--scenes a,b] [--core-seconds] [--no-charts] [-j N]
 
 FOLDER (tests/bench/plan_scenes where absent) holds NAME.toml and list.json: [{"scene": NAME, "tolerance": X, "pictures": N,
-"cached": BOOL,
-"reference_spp": N}]. cached: the fabric's data are there, and rendering alone is the cost; otherwise the cache holds the accuracy tables
-only, and building what a plan or a run needs counts once, rendering N times. The plan's own time always counts, once. Times are
-wall clock, for an idle machine; --core-seconds counts processor time, which other work on the machine disturbs less. Charts in OUT
-are kept and used again. --no-charts makes the path-traced reference alone, in a fraction of the time: errors and costs, without
-the best of the chart.
+"cached": BOOL, "reference_spp": N}]. cached: the fabric's data are there, and rendering alone is the cost. Otherwise the cache holds
+the accuracy tables only; building what a plan or a run needs counts once, rendering N times. The plan's own time always counts, once.
+Times are wall clock, for an idle machine. --core-seconds counts processor time, which other work on the machine disturbs less.
+Charts in OUT are kept and used again. --no-charts makes the path-traced reference alone, in a fraction of the time: errors and costs,
+without the best of the chart.
 """
 
 import argparse
 import json
 import pathlib
-import re
 import shutil
 import subprocess
 import sys
@@ -58,15 +56,12 @@ def chart_of(program, scene, folder, reference_spp, cache, threads):
 
 def reference_of(program, scene, folder, reference_spp, cache, threads):
     """A path-traced picture with the next seed, as the reference of a chart has: one that shares the picture's random numbers
-    would make errors look smaller. The seed stands in a copy of the scene, since --seed would change the fibers, too."""
+    would make errors look smaller."""
     reference = folder / "reference.exr"
-    if reference.exists():
-        return reference
-    folder.mkdir(exist_ok=True)
-    text = re.sub(r'"([^"]*\.(?:toml|obj|exr|hdr))"', lambda found: f'"{(scene.parent / found[1]).resolve()}"', scene.read_text())
-    copy = folder / "reference.toml"
-    copy.write_text(text + "\n[render]\nseed = 2\n")
-    heddle(program, "render", copy, "-o", reference, "--method", "path", "--spp", reference_spp, "--cache", cache, "-q", *threads)
+    if not reference.exists():
+        folder.mkdir(exist_ok=True)
+        heddle(program, "render", scene, "-o", reference, "--method", "path", "--spp", reference_spp, "--seed", 2, "--cache", cache,
+               "-q", *threads)
     return reference
 
 

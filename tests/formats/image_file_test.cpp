@@ -27,7 +27,7 @@ namespace {
 
 class ImageFileFormat : public FileFixture {};
 
-Image sample(int width, int height) {
+Image sample_image(int width, int height) {
   Image image;
   image.width = width;
   image.height = height;
@@ -64,7 +64,7 @@ void expect_equal(const Image& a, const Image& b) {
 TEST_F(ImageFileFormat, RoundTripOfEveryChannelType) {
   // Heights below, at and above a block of 16 scan lines.
   for (const auto& [width, height] : {std::pair{1, 1}, {5, 16}, {13, 35}}) {
-    const Image image = sample(width, height);
+    const Image image = sample_image(width, height);
     write_exr(folder_ / "a.exr", image);
     expect_equal(image, read_exr(folder_ / "a.exr"));
   }
@@ -82,7 +82,7 @@ TEST_F(ImageFileFormat, HalvesAreClampedToFiniteValues) {
 }
 
 TEST_F(ImageFileFormat, EqualImagesGiveEqualBytesForAnyNumberOfThreads) {
-  const Image image = sample(70, 90);
+  const Image image = sample_image(70, 90);
   const int before = Imf::globalThreadCount();
   Imf::setGlobalThreadCount(0);
   write_exr(folder_ / "a.exr", image);
@@ -95,7 +95,7 @@ TEST_F(ImageFileFormat, EqualImagesGiveEqualBytesForAnyNumberOfThreads) {
 }
 
 TEST_F(ImageFileFormat, HeaderSaysRec709AndZip) {
-  write_exr(folder_ / "a.exr", sample(4, 4));
+  write_exr(folder_ / "a.exr", sample_image(4, 4));
   Imf::InputFile file((folder_ / "a.exr").c_str());
   EXPECT_EQ(file.header().compression(), Imf::ZIP_COMPRESSION);
   ASSERT_TRUE(Imf::hasChromaticities(file.header()));
@@ -128,7 +128,7 @@ TEST_F(ImageFileFormat, ReadsTiledFilesAndShiftedWindows) {
 }
 
 TEST_F(ImageFileFormat, TruncatedFilesAreRefused) {
-  write_exr(folder_ / "a.exr", sample(9, 40));
+  write_exr(folder_ / "a.exr", sample_image(9, 40));
   const std::string bytes = bytes_of(folder_ / "a.exr");
   for (std::size_t size = 0; size < bytes.size(); size += size < 600 ? 1 : 13) {
     const auto path = put("t.exr", bytes.substr(0, size));
@@ -137,7 +137,7 @@ TEST_F(ImageFileFormat, TruncatedFilesAreRefused) {
 }
 
 TEST_F(ImageFileFormat, FlippedBitsNeverCrash) {
-  write_exr(folder_ / "a.exr", sample(9, 40));
+  write_exr(folder_ / "a.exr", sample_image(9, 40));
   const std::string bytes = bytes_of(folder_ / "a.exr");
   int refused = 0;
   for (std::size_t at = 0; at < bytes.size(); ++at) {
@@ -162,7 +162,7 @@ TEST_F(ImageFileFormat, GarbageAndAbsentFilesAreRefused) {
 }
 
 TEST_F(ImageFileFormat, SizesAreCheckedBeforeMemoryIsTaken) {
-  write_exr(folder_ / "a.exr", sample(9, 40));
+  write_exr(folder_ / "a.exr", sample_image(9, 40));
   const std::string bytes = bytes_of(folder_ / "a.exr");
   const std::string name("dataWindow\0box2i\0\x10\0\0\0", 21);
   const std::size_t at = bytes.find(name) + name.size();
@@ -316,7 +316,7 @@ TEST_F(ImageFileFormat, MemoryIsUsedAsDataProveToBeThere) {
 }
 
 TEST_F(ImageFileFormat, AttributesLongerThanTheFileAreRefused) {
-  Image image = sample(9, 40);
+  Image image = sample_image(9, 40);
   image.metadata["note"] = "text";
   write_exr(folder_ / "a.exr", image);
   std::string bytes = bytes_of(folder_ / "a.exr");
@@ -386,10 +386,11 @@ TEST_F(ImageFileFormat, MultiPartDeepAndSubsampledFilesAreRefused) {
 }
 
 TEST_F(ImageFileFormat, FailedWritesNameTheTarget) {
-  EXPECT_NE(error_of([&] { write_exr(folder_ / "no" / "a.exr", sample(2, 2)); }).find("a.exr"),
-            std::string::npos);
+  EXPECT_NE(
+      error_of([&] { write_exr(folder_ / "no" / "a.exr", sample_image(2, 2)); }).find("a.exr"),
+      std::string::npos);
   // A string cannot take the place of a standard attribute.
-  Image image = sample(2, 2);
+  Image image = sample_image(2, 2);
   image.metadata["compression"] = "none";
   EXPECT_NE(error_of([&] { write_exr(folder_ / "a.exr", image); }).find("a.exr: cannot write"),
             std::string::npos);

@@ -17,7 +17,6 @@
 namespace heddle {
 namespace {
 
-constexpr double kHalfPi = 0.5 * kPi;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 VisibilityLine line_at(double distance, double gradient) {

@@ -191,33 +191,14 @@ TEST(Chart, SurfacesThatHaveAChoiceAreShadedBothWays) {
   }
 }
 
-constexpr char kScene[] = R"(name = "tiny <swatch>, \"quoted\""
-
-[camera]
-position_mm = [0.3, -1.5, 3]
-look_at_mm = [0, 0, 0]
-fov_deg = 25
-fov_axis = "vertical"
-resolution_px = [24, 18]
-
-[[light]]
-type = "directional"
-direction = [0.3, 0.2, 1]
-irradiance = [3, 3, 3]
-
-[[light]]
-type = "sg"
-axis = [-0.5, 0.4, 1]
-sharpness = 15
-irradiance = [1, 1, 1]
-
-[[cloth]]
-flat_mm = [10, 10]
-fabric = "fabric.toml"
-
-[render]
-method = "exact"
-)";
+/// The small scene by a name that must be escaped, from further away.
+std::string chart_scene() {
+  const std::string name = R"(name = "tiny <swatch>, \"quoted\"")";
+  std::string scene = edited(kSmallScene, R"(name = "swatch")", name);
+  scene = edited(scene, "[0.1, -0.5, 1.0]", "[0.3, -1.5, 3]");
+  scene = edited(scene, "[24, 24]", "[24, 18]");
+  return edited(scene, "[4, 4]", "[10, 10]");
+}
 
 /// A chart of a tiny scene. ctest runs each test in a process of its own, so each makes its chart:
 /// a few seconds.
@@ -226,7 +207,7 @@ class ChartEndToEnd : public testing::Test {
   static void SetUpTestSuite() {
     folder_ = std::make_unique<TemporaryFolder>();
     std::ofstream(folder_->path() / "fabric.toml") << kSmallFabric;
-    std::ofstream(folder_->path() / "scene.toml") << kScene;
+    std::ofstream(folder_->path() / "scene.toml") << chart_scene();
     first_ = run({"--quick", "--reference-spp", "64"}).status;
   }
   static void TearDownTestSuite() { folder_.reset(); }

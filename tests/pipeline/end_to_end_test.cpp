@@ -361,13 +361,6 @@ TEST(InfoEndToEnd, ReadsWhatTheProgramReadsAndWrites) {
   EXPECT_EQ(shop.run({"info", "other.json"}).status, 1);
 }
 
-std::string edited(const char* original, const std::string& from, const std::string& to) {
-  std::string text = original;
-  const std::size_t at = text.find(from);
-  EXPECT_NE(at, std::string::npos) << from;
-  return text.replace(at, from.size(), to);
-}
-
 /// The small scene with a square of 3 mm below its cloth that a surface model draws.
 std::string scene_with_surface(const Workshop& shop, const std::string& surface) {
   std::ofstream(shop / "square.obj")
@@ -443,7 +436,7 @@ TEST(SurfacesEndToEnd, SurfacesAloneNeedNoStagesAndAnEditedOneMakesANewPicture) 
 
   std::ofstream(shop / "own.toml") << "# comments change nothing\n" << preset;
   EXPECT_FALSE(built("2", "pictures.again"));
-  std::ofstream(shop / "own.toml") << edited(preset.c_str(), "kd = 0.3", "kd = 0.4");
+  std::ofstream(shop / "own.toml") << edited(preset, "kd = 0.3", "kd = 0.4");
   EXPECT_TRUE(built("2", "pictures.edited"));
   EXPECT_NE(text_of(shop / "pictures.edited" / "alone.exr"),
             text_of(shop / "pictures.2" / "alone.exr"));
@@ -561,24 +554,23 @@ TEST(SurfacesEndToEnd, ThreadsLightsAndCamerasAreEditedWithoutPrecomputingAgain)
                                  {"gamma_s_deg = 12", "gamma_s_deg = 9"},
                                  {"gamma_v_deg = 24", "gamma_v_deg = 40"},
                                  {"albedo = [0.06, 0.24, 0.3]", "albedo = [0.3, 0.2, 0.1]"}}) {
-    other = edited(other.c_str(), from, to);
+    other = edited(other, from, to);
   }
   std::ofstream(shop / "own.toml") << other;
   EXPECT_EQ(built("pictures.threads"), Stages{"edited"});
   EXPECT_NE(text_of(shop / "pictures.threads" / "edited.exr"),
             text_of(shop / "pictures.first" / "edited.exr"));
 
-  scene = edited(edited(scene.c_str(), "fov_deg = 25", "fov_deg = 30").c_str(), "sharpness = 15",
-                 "sharpness = 50");
+  scene = edited(edited(scene, "fov_deg = 25", "fov_deg = 30"), "sharpness = 15", "sharpness = 50");
   std::ofstream(shop / "edited.toml") << scene + "surface_method = \"interactive\"\n";
   EXPECT_EQ(built("pictures.lights"), Stages{"edited"});
 
   // A curve is another table; what stands over the cloth makes other maps.
   std::ofstream(shop / "own.toml")
-      << edited(other.c_str(), "offsets_deg = [-25, 25]", "offsets_deg = [-20, 20]");
+      << edited(other, "offsets_deg = [-25, 25]", "offsets_deg = [-20, 20]");
   EXPECT_EQ(built("pictures.curves"), (Stages{"surface-weights", "edited"}));
   std::ofstream(shop / "edited.toml")
-      << edited(scene.c_str(), "[0.2, 4]", "[0.4, 4]") + "surface_method = \"interactive\"\n";
+      << edited(scene, "[0.2, 4]", "[0.4, 4]") + "surface_method = \"interactive\"\n";
   EXPECT_EQ(built("pictures.shapes"), (Stages{"surface-maps", "surface-maps", "edited"}));
 
   // Sampled, nothing of it is asked for.

@@ -4,6 +4,8 @@
 
 #include <nlohmann/json.hpp>
 #include <sstream>
+#include <stdexcept>
+#include <string>
 
 #include "pipeline/eval/eval.h"
 
@@ -14,6 +16,18 @@ inline nlohmann::json answer(const nlohmann::json& request) {
   std::ostringstream out;
   run_eval(in, out);
   return nlohmann::json::parse(out.str());
+}
+
+template <class T = double>
+T eval_value(const nlohmann::json& request) {
+  const nlohmann::json result = answer(request);
+  if (!result.contains("value")) throw std::runtime_error(result.dump());
+  return result.at("value").get<T>();
+}
+
+/// Empty where there is none.
+inline std::string eval_error(const nlohmann::json& request) {
+  return answer(request).value("error", std::string());
 }
 
 }  // namespace heddle

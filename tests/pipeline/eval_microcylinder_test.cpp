@@ -13,16 +13,6 @@ namespace {
 
 using Json = nlohmann::json;
 
-std::vector<double> value_of(const Json& request) {
-  const Json result = answer(request);
-  EXPECT_TRUE(result.contains("value")) << result;
-  return result.value("value", std::vector<double>(3, std::nan("")));
-}
-
-std::string error_of(const Json& request) {
-  return answer(request).value("error", std::string());
-}
-
 Json thread_request() {
   return {{"quantity", "thread"},
           {"thread",
@@ -49,7 +39,7 @@ TEST(EvalThread, MirrorDirectionByHand) {
   const double surface = reflected * height / radians(5);
   const double volume =
       std::pow(1 - reflected, 2) * (.8 * height / radians(10) + .2) / (2 * std::cos(theta));
-  const std::vector<double> value = value_of(thread_request());
+  const std::vector<double> value = eval_value<std::vector<double>>(thread_request());
   const double albedo[] = {.12, .114, .006};
   for (std::size_t k = 0; k < 3; ++k) {
     const double expected = (surface + albedo[k] * volume) / std::pow(std::cos(theta), 2);
@@ -65,7 +55,7 @@ TEST(EvalThreadLaw, IsReciprocal) {
   Json back = forth;
   back["theta_i_deg"] = -43, back["phi_i_deg"] = -160, back["theta_o_deg"] = 20,
   back["phi_o_deg"] = 170;
-  EXPECT_EQ(value_of(forth), value_of(back));
+  EXPECT_EQ(eval_value<std::vector<double>>(forth), eval_value<std::vector<double>>(back));
 }
 
 Json linen() {
@@ -86,16 +76,20 @@ Json request_for(const Json& fabric) {
 }
 
 TEST(EvalMicrocylinder, AnObjectSaysTheSameAsItsConfig) {
-  EXPECT_EQ(value_of(request_for(linen())), value_of(request_for("linen-plain")));
+  EXPECT_EQ(eval_value<std::vector<double>>(request_for(linen())),
+            eval_value<std::vector<double>>(request_for("linen-plain")));
   Json without = linen();
   without.erase("model");
-  EXPECT_EQ(value_of(request_for(without)), value_of(request_for("linen-plain")));
+  EXPECT_EQ(eval_value<std::vector<double>>(request_for(without)),
+            eval_value<std::vector<double>>(request_for("linen-plain")));
   for (const auto& [key, value] : {std::pair<const char*, Json>{"gaussian_width", "iw"},
                                    {"fresnel_angle", "normal"},
                                    {"blend_width_deg", 15.5}}) {
     Json other = linen();
     other[key] = value;
-    EXPECT_NE(value_of(request_for(other)), value_of(request_for("linen-plain"))) << key;
+    EXPECT_NE(eval_value<std::vector<double>>(request_for(other)),
+              eval_value<std::vector<double>>(request_for("linen-plain")))
+        << key;
   }
 }
 
@@ -120,19 +114,19 @@ TEST(EvalMicrocylinder, OneFlatThreadByHand) {
   for (const char* key : {"ior", "albedo", "kd", "gamma_s_deg", "gamma_v_deg"}) {
     thread["thread"][key] = fabric["thread"][0][key];
   }
-  const std::vector<double> scattering = value_of(thread);
-  const std::vector<double> value = value_of(request);
+  const std::vector<double> scattering = eval_value<std::vector<double>>(thread);
+  const std::vector<double> value = eval_value<std::vector<double>>(request);
   for (std::size_t k = 0; k < 3; ++k) EXPECT_NEAR(value[k], .5 * scattering[k] * p * .8 / q, 1e-12);
 }
 
 TEST(EvalMicrocylinder, BelowTheHorizonIsBlack) {
   Json request = request_for("velvet");
   request["wi"] = {.6, 0, -.8};
-  EXPECT_EQ(value_of(request), std::vector<double>(3, 0.0));
+  EXPECT_EQ(eval_value<std::vector<double>>(request), std::vector<double>(3, 0.0));
 }
 
 TEST(EvalMicrocylinderFormat, ErrorsNameTheField) {
-  const std::string unknown = error_of(request_for("denim"));
+  const std::string unknown = eval_error(request_for("denim"));
   for (const char* known :
        {"denim", "linen-plain", "polyester-charmeuse-back", "polyester-charmeuse-front",
         "silk-crepe-de-chine", "silk-shot", "velvet"}) {
@@ -140,34 +134,34 @@ TEST(EvalMicrocylinderFormat, ErrorsNameTheField) {
   }
   Json fabric = linen();
   fabric["thread"][1]["kd"] = 2;
-  EXPECT_NE(error_of(request_for(fabric)).find("kd"), std::string::npos)
-      << error_of(request_for(fabric));
+  EXPECT_NE(eval_error(request_for(fabric)).find("kd"), std::string::npos)
+      << eval_error(request_for(fabric));
   fabric = linen();
   fabric["thread"][0]["colour"] = "red";
-  EXPECT_NE(error_of(request_for(fabric)).find("colour"), std::string::npos)
-      << error_of(request_for(fabric));
+  EXPECT_NE(eval_error(request_for(fabric)).find("colour"), std::string::npos)
+      << eval_error(request_for(fabric));
   fabric = linen();
   fabric["model"] = "velour";
-  EXPECT_NE(error_of(request_for(fabric)).find("model"), std::string::npos);
+  EXPECT_NE(eval_error(request_for(fabric)).find("model"), std::string::npos);
   fabric = linen();
   fabric["energy_safe"] = nullptr;
-  EXPECT_NE(error_of(request_for(fabric)).find("null"), std::string::npos);
+  EXPECT_NE(eval_error(request_for(fabric)).find("null"), std::string::npos);
   for (const Json& wrong : {Json(3), Json::array(), Json::object(), Json()}) {
-    EXPECT_NE(error_of(request_for(wrong)).find("fabric"), std::string::npos) << wrong;
+    EXPECT_NE(eval_error(request_for(wrong)).find("fabric"), std::string::npos) << wrong;
   }
   for (const char* field : {"wi", "wo", "fabric"}) {
     Json request = request_for("velvet");
     request.erase(field);
-    EXPECT_NE(error_of(request).find(field), std::string::npos);
+    EXPECT_NE(eval_error(request).find(field), std::string::npos);
   }
   for (const char* field : {"ior", "albedo", "kd", "gamma_s_deg", "gamma_v_deg"}) {
     Json request = thread_request();
     request["thread"][field] = -1;
-    EXPECT_NE(error_of(request).find(std::string("thread.") + field), std::string::npos);
+    EXPECT_NE(eval_error(request).find(std::string("thread.") + field), std::string::npos);
   }
   Json request = thread_request();
   request["theta_i_deg"] = 91;
-  EXPECT_NE(error_of(request).find("theta_i_deg"), std::string::npos);
+  EXPECT_NE(eval_error(request).find("theta_i_deg"), std::string::npos);
 }
 
 }  // namespace

@@ -34,14 +34,14 @@ Outcome run(const std::string& input) {
   return result;
 }
 
-Json answer(const std::string& line) {
+Json answer_line(const std::string& line) {
   const Outcome result = run(line + "\n");
   EXPECT_EQ(result.lines.size(), 1U) << line;
   return Json::parse(result.lines.at(0));
 }
 
 Json value_of(const std::string& line) {
-  const Json json = answer(line);
+  const Json json = answer_line(line);
   EXPECT_TRUE(json.contains("value")) << line << "\n" << json;
   return json.value("value", Json());
 }
@@ -49,7 +49,7 @@ Json value_of(const std::string& line) {
 // The error of a bad line, which must have status 1 and no value.
 std::string error_of(const std::string& line) {
   EXPECT_EQ(run(line).status, 1) << line;
-  const Json json = answer(line);
+  const Json json = answer_line(line);
   EXPECT_FALSE(json.contains("value")) << line;
   return json.value("error", std::string());
 }
@@ -128,7 +128,7 @@ TEST(EvalFormat, EveryTruncationOfALineIsAnAnsweredError) {
                            R"(,"wi":[0,1,0],"wo":[0,-1,0],"lobe":"tt"})";
   EXPECT_EQ(run(line).status, 0);
   for (std::size_t length = 1; length < line.size(); ++length) {
-    const Json json = answer(line.substr(0, length));
+    const Json json = answer_line(line.substr(0, length));
     EXPECT_TRUE(json.contains("error") && json["id"].is_null()) << length;
   }
 }
@@ -266,7 +266,7 @@ TEST(EvalFormat, ErrorsNameTheField) {
 }
 
 TEST(EvalFormat, ADuplicateFieldKeepsTheId) {
-  EXPECT_EQ(answer(R"({"id":5,"quantity":"sg_mass","sharpness":1,"sharpness":1})")["id"], 5);
+  EXPECT_EQ(answer_line(R"({"id":5,"quantity":"sg_mass","sharpness":1,"sharpness":1})")["id"], 5);
 }
 
 TEST(EvalAgreement, NumbersReadBackExactly) {

@@ -14,12 +14,6 @@ namespace {
 
 using Json = nlohmann::json;
 
-Json value_of(const Json& request) {
-  const Json result = answer(request);
-  EXPECT_TRUE(result.contains("value")) << result;
-  return result.value("value", Json());
-}
-
 Json request_of(const std::vector<std::string>& map) {
   return {{"quantity", "visibility"},
           {"map", map},
@@ -38,7 +32,7 @@ TEST(EvalVisibility, HalfSpace) {
   Json request = request_of(upper_half(16));
   const double sharpness = 30;
   request["sharpness"] = sharpness;
-  const Json value = value_of(request);
+  const Json value = eval_value<Json>(request);
   for (std::size_t i = 0; i < kHeights.size(); ++i) {
     const double distance = std::asin(kHeights[i]);
     // (1, 0, 0) lies on the edge itself: distance 0 on either side.
@@ -58,7 +52,7 @@ TEST(EvalVisibility, NoEdgeIsPlusOrMinusPi) {
     for (const bool open : {false, true}) {
       Json request = request_of(std::vector<std::string>(n, std::string(n, open ? '1' : '0')));
       request["sharpness"] = 3;
-      const Json value = value_of(request);
+      const Json value = eval_value<Json>(request);
       for (std::size_t i = 0; i < 4; ++i) {
         EXPECT_EQ(value["ssdf"][i].get<double>(), open ? kPi : -kPi);
         EXPECT_NEAR(value["quadrature"][i].get<double>(), open ? 1 : 0, 1e-9);
@@ -80,7 +74,7 @@ TEST(EvalVisibilityLaw, ConstantLightSeesTheSolidAngle) {
   Json request = request_of(map);
   request["sharpness"] = 0;
   request["weights"] = "voronoi";
-  const Json value = value_of(request);
+  const Json value = eval_value<Json>(request);
   EXPECT_NEAR(value["quadrature"][1].get<double>(), share, 1e-12);
   EXPECT_NEAR(value["sg_sum_integral"][1].get<double>(), share, 1e-12);
   EXPECT_EQ(value["ssdf_integral"][1].get<double>(), 0.5);
@@ -94,7 +88,7 @@ TEST(EvalVisibility, ASharpLightSeesTheCell) {
     Json request = request_of(map);
     request["directions"] = {{hidden.x(), hidden.y(), hidden.z()}, {0, 0, -1}};
     request["sharpness"] = sharpness;
-    const Json value = value_of(request);
+    const Json value = eval_value<Json>(request);
     EXPECT_NEAR(value["quadrature"][0].get<double>(), 0, 1e-9);
     EXPECT_NEAR(value["quadrature"][1].get<double>(), 1, 1e-6);
     EXPECT_EQ(value["ssdf_integral"][0].get<double>(), 0);
@@ -111,7 +105,7 @@ TEST(EvalVisibility, AxesCountAndSharpnessAreWhatIsAskedFor) {
   request["count"] = 20;
   request["sharpness_svf"] = 128;
   request["weights"] = "voronoi";
-  const Json value = value_of(request);
+  const Json value = eval_value<Json>(request);
   const double weight = LatLongGrid(static_cast<int>(n)).solid_angle(0);
   for (std::size_t i = 0; i < kHeights.size(); ++i) {
     EXPECT_NEAR(value["sg_sum"][i].get<double>(),
@@ -130,17 +124,16 @@ TEST(EvalVisibility, UpperAxesIgnoreWhatIsBelow) {
         (*r)["axes"] = axes;
         (*r)["weights"] = weights;
       }
-      EXPECT_EQ(value_of(request)["sg_sum"], value_of(upper)["sg_sum"]);
+      EXPECT_EQ(eval_value<Json>(request)["sg_sum"], eval_value<Json>(upper)["sg_sum"]);
     }
   }
   Json sphere = request_of(whole);
   sphere["axes"] = "sphere";
-  EXPECT_EQ(value_of(request_of(whole)), value_of(sphere))
+  EXPECT_EQ(eval_value<Json>(request_of(whole)), eval_value<Json>(sphere))
       << "the default where cells below are open";
 }
 
 TEST(EvalVisibilityFormat, ErrorsNameTheField) {
-  auto error_of = [](const Json& request) { return answer(request).value("error", std::string()); };
   auto with = [](const char* field, const Json& value) {
     Json request = request_of(upper_half(4));
     request[field] = value;
@@ -165,30 +158,29 @@ TEST(EvalVisibilityFormat, ErrorsNameTheField) {
       {"extra", 1},
   };
   for (const auto& [field, value] : bad) {
-    EXPECT_NE(error_of(with(field, value)).find(field), std::string::npos) << field << " " << value;
+    EXPECT_NE(eval_error(with(field, value)).find(field), std::string::npos)
+        << field << " " << value;
   }
   for (const char* field : {"map", "directions"}) {
     Json request = request_of(upper_half(4));
     request.erase(field);
-    EXPECT_NE(error_of(request).find(field), std::string::npos);
+    EXPECT_NE(eval_error(request).find(field), std::string::npos);
   }
 }
 
 // Work and memory grow with cells times Gaussians and cells times directions.
 TEST(EvalVisibility, RequestsThatCostTooMuchAreRefused) {
-  const auto error = [](const Json& request) {
-    return answer(request).value("error", std::string());
-  };
-  EXPECT_EQ(error(request_of(upper_half(257))), "field \"map\": expected 1 to 256 strings");
+  EXPECT_EQ(eval_error(request_of(upper_half(257))), "field \"map\": expected 1 to 256 strings");
   Json request = request_of(upper_half(128));
   request["count"] = 1025;
-  EXPECT_EQ(error(request), "field \"count\": must be an integer from 1 to 1024");
+  EXPECT_EQ(eval_error(request), "field \"count\": must be an integer from 1 to 1024");
   request = request_of(upper_half(256));
   request["count"] = 257;
-  EXPECT_EQ(error(request), "field \"count\": must be an integer from 1 to 256");
+  EXPECT_EQ(eval_error(request), "field \"count\": must be an integer from 1 to 256");
   request = request_of(upper_half(256));
   request["directions"] = std::vector<std::vector<int>>(65, {0, 0, 1});
-  EXPECT_EQ(error(request), "field \"directions\": expected at most 64 with a map of this size");
+  EXPECT_EQ(eval_error(request),
+            "field \"directions\": expected at most 64 with a map of this size");
 }
 
 }  // namespace

@@ -12,16 +12,6 @@ namespace {
 
 using Json = nlohmann::json;
 
-double value_of(const Json& request) {
-  const Json result = answer(request);
-  EXPECT_TRUE(result.contains("value")) << result;
-  return result.value("value", std::nan(""));
-}
-
-std::string error_of(const Json& request) {
-  return answer(request).value("error", "");
-}
-
 // A disc of radius 1/2 in a square window of side 2; half = (1, 0) takes its centre to the right
 // edge, (1, 1) to the corner.
 const Json kDisc = {
@@ -33,10 +23,10 @@ Json area_request(double hx, double hy) {
 
 TEST(EvalWoven, AreaOfADisc) {
   const double whole = kPi * 0.25 / 4.0;
-  EXPECT_NEAR(value_of(area_request(0, 0)), whole, 1e-15);
-  EXPECT_NEAR(value_of(area_request(1, 0)), whole / 2, 1e-15);
-  EXPECT_NEAR(value_of(area_request(-1, 1)), whole / 4, 1e-15);
-  EXPECT_EQ(value_of(area_request(2, 0)), 0.0);
+  EXPECT_NEAR(eval_value(area_request(0, 0)), whole, 1e-15);
+  EXPECT_NEAR(eval_value(area_request(1, 0)), whole / 2, 1e-15);
+  EXPECT_NEAR(eval_value(area_request(-1, 1)), whole / 4, 1e-15);
+  EXPECT_EQ(eval_value(area_request(2, 0)), 0.0);
 }
 
 Json pair_request(const char* quantity) {
@@ -49,9 +39,9 @@ TEST(EvalWoven, BtfInAndBesideTheHighlight) {
   request["segment"] = kDisc;
   request["point"] = {1.49, 1};
   // Normal incidence: F = 0.04, G = 1, both cosines 1.
-  EXPECT_NEAR(value_of(request), 0.1 + 2 * 0.04, 1e-15);
+  EXPECT_NEAR(eval_value(request), 0.1 + 2 * 0.04, 1e-15);
   request["point"] = {1.51, 1};
-  EXPECT_NEAR(value_of(request), 0.1, 1e-15);
+  EXPECT_NEAR(eval_value(request), 0.1, 1e-15);
   // Mirror pair at 60 degrees: h = n, cos(theta_d) = 1/2, G = min(1, 2 * 1/2 / 1/2) = 1, cosines
   // 1/2 each.
   request["point"] = {1, 1};
@@ -60,9 +50,9 @@ TEST(EvalWoven, BtfInAndBesideTheHighlight) {
   const double t = std::sqrt(1.0 - 0.75 / 2.25);
   const double s = std::pow((0.5 - 1.5 * t) / (0.5 + 1.5 * t), 2);
   const double p = std::pow((t - 0.75) / (t + 0.75), 2);
-  EXPECT_NEAR(value_of(request), 0.1 + 2 * 0.5 * (s + p) / 0.25, 1e-12);
+  EXPECT_NEAR(eval_value(request), 0.1 + 2 * 0.5 * (s + p) / 0.25, 1e-12);
   request["wi"] = {0, 0.6, -0.8};
-  EXPECT_EQ(value_of(request), 0.0);
+  EXPECT_EQ(eval_value(request), 0.0);
 }
 
 TEST(EvalWoven, BrdfWeighsSegmentsByArea) {
@@ -70,7 +60,7 @@ TEST(EvalWoven, BrdfWeighsSegmentsByArea) {
   Json empty = kDisc;
   empty["alpha"] = 0;
   request["segments"] = {{{"segment", kDisc}, {"area", 3}}, {{"segment", empty}, {"area", 1}}};
-  EXPECT_NEAR(value_of(request), 0.1 + 2 * 0.04 * 0.75 * kPi * 0.25 / 4.0, 1e-15);
+  EXPECT_NEAR(eval_value(request), 0.1 + 2 * 0.04 * 0.75 * kPi * 0.25 / 4.0, 1e-15);
 }
 
 TEST(EvalWoven, YarnsFarIsTheMeanOfNear) {
@@ -92,31 +82,31 @@ TEST(EvalWoven, YarnsFarIsTheMeanOfNear) {
 }
 
 TEST(EvalWoven, ErrorsNameTheField) {
-  EXPECT_NE(error_of({{"quantity", "woven_area"}, {"segment", kDisc}}).find("\"half\""),
+  EXPECT_NE(eval_error({{"quantity", "woven_area"}, {"segment", kDisc}}).find("\"half\""),
             std::string::npos);
   Json request = area_request(0, 0);
   request["segment"]["size"] = {0, 1};
-  EXPECT_NE(error_of(request).find("\"segment.size\""), std::string::npos);
+  EXPECT_NE(eval_error(request).find("\"segment.size\""), std::string::npos);
   request = area_request(0, 0);
   request["segment"]["eccentricity"] = 1.5;
-  EXPECT_NE(error_of(request).find("\"segment.eccentricity\""), std::string::npos);
+  EXPECT_NE(eval_error(request).find("\"segment.eccentricity\""), std::string::npos);
   request["segment"]["eccentricity"] = 0.5;
   request["segment"]["tilt"] = 1;
-  EXPECT_NE(error_of(request).find("\"segment.tilt\""), std::string::npos);
+  EXPECT_NE(eval_error(request).find("\"segment.tilt\""), std::string::npos);
   request = pair_request("woven_brdf");
   request["segments"] = Json::array();
-  EXPECT_NE(error_of(request).find("\"segments\""), std::string::npos);
+  EXPECT_NE(eval_error(request).find("\"segments\""), std::string::npos);
   request["segments"] = {{{"segment", kDisc}, {"area", -1}}};
-  EXPECT_NE(error_of(request).find("\"segments[0].area\""), std::string::npos);
+  EXPECT_NE(eval_error(request).find("\"segments[0].area\""), std::string::npos);
   request["segments"] = {{{"segment", kDisc}, {"area", 0}}};
-  EXPECT_NE(error_of(request).find("\"segments\""), std::string::npos);
+  EXPECT_NE(eval_error(request).find("\"segments\""), std::string::npos);
   request = pair_request("woven_btf");
   request["segment"] = kDisc;
   request["point"] = {0, 0};
   request["ior"] = 0.5;
-  EXPECT_NE(error_of(request).find("\"ior\""), std::string::npos);
+  EXPECT_NE(eval_error(request).find("\"ior\""), std::string::npos);
   EXPECT_NE(
-      error_of(
+      eval_error(
           {{"quantity", "woven_yarns"}, {"fabric", "tweed"}, {"wi", {0, 0, 1}}, {"wo", {0, 0, 1}}})
           .find("irawan-denim"),
       std::string::npos);

@@ -22,7 +22,7 @@ struct Include {
   bool quoted;
 };
 
-const fs::path kRoot = HEDDLE_SOURCE_DIR;
+const fs::path kSources = HEDDLE_SOURCE_DIR;
 
 /// What a module may include besides itself.
 const std::map<std::string, std::set<std::string>> kArrows = {
@@ -62,11 +62,11 @@ std::string module_of(const std::string& path) {
 std::vector<std::string> source_files() {
   std::vector<std::string> files;
   for (const char* folder : {"formats", "fibers", "precompute", "render", "pipeline"}) {
-    if (!fs::exists(kRoot / folder)) continue;
-    for (const auto& entry : fs::recursive_directory_iterator(kRoot / folder)) {
+    if (!fs::exists(kSources / folder)) continue;
+    for (const auto& entry : fs::recursive_directory_iterator(kSources / folder)) {
       const std::string extension = entry.path().extension().string();
       if (extension == ".h" || extension == ".cpp")
-        files.push_back(fs::relative(entry.path(), kRoot).string());
+        files.push_back(fs::relative(entry.path(), kSources).string());
     }
   }
   std::sort(files.begin(), files.end());
@@ -74,7 +74,7 @@ std::vector<std::string> source_files() {
 }
 
 std::string text_of(const std::string& file) {
-  std::ifstream stream(kRoot / file);
+  std::ifstream stream(kSources / file);
   std::stringstream text;
   text << stream.rdbuf();
   return text.str();
@@ -92,7 +92,7 @@ std::vector<Include> includes_of(const std::string& file, const std::string& tex
 
 std::string broken_arrow(const Include& include) {
   if (!include.quoted) return "";
-  if (!fs::exists(kRoot / include.target))
+  if (!fs::exists(kSources / include.target))
     return include.file + " includes " + include.target + ", not a path from the root";
   const std::string from = module_of(include.file);
   const std::string to = module_of(include.target);

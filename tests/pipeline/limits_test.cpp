@@ -23,11 +23,6 @@ class LimitsEndToEnd : public testing::Test {
   void write(const std::string& name, const std::string& text) const {
     std::ofstream(folder_.path() / name) << text;
   }
-  static std::string edited(std::string text, const std::string& from, const std::string& to) {
-    const std::size_t at = text.find(from);
-    EXPECT_NE(at, std::string::npos) << from;
-    return text.replace(at, from.size(), to);
-  }
   /// With at most 4 GB of address space, as by `ulimit -v`.
   ProgramResult run(const std::vector<std::string>& arguments) const {
     return Program(

@@ -28,18 +28,10 @@ double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-std::string edited(std::string text, const std::string& from, const std::string& to) {
-  for (std::size_t at = text.find(from); at != std::string::npos;
-       at = text.find(from, at + to.size())) {
-    text.replace(at, from.size(), to);
-  }
-  return text;
-}
-
 /// A folder of inputs that keep any command busy for a while, and a warm cache of the small fabric.
-class Workshop {
+class BusyWorkshop {
  public:
-  Workshop() {
+  BusyWorkshop() {
     const std::string small = edited(kSmallFabric, "fibers_per_ply = 24", "fibers_per_ply = 12");
     write("fabric.toml", small);
     write("scene.toml", kSmallScene);
@@ -122,7 +114,7 @@ void leave_standard_input_open() {
 }
 
 /// A pack of nothing but the fibers of many.toml, and two large pictures.
-void make_large_files(const Workshop& shop) {
+void make_large_files(const BusyWorkshop& shop) {
   const Json report = shop.report({"synth", "many.toml"});
   fs::create_directories(shop / "many.pack");
   fs::copy_file(shop / report.at("artifacts").at(0).get<std::string>(),
@@ -145,7 +137,7 @@ void make_large_files(const Workshop& shop) {
 }
 
 TEST(SignalsEndToEnd, EveryCommandEndsWithinASecondAndSaysWhatIsKept) {
-  const Workshop shop;
+  const BusyWorkshop shop;
   shop.report({"precompute", "fabric.toml"});
   make_large_files(shop);
   struct Case {
@@ -189,7 +181,7 @@ TEST(SignalsEndToEnd, EveryCommandEndsWithinASecondAndSaysWhatIsKept) {
 }
 
 TEST(SignalsEndToEnd, ASecondSignalEndsAtOnce) {
-  const Workshop shop;
+  const BusyWorkshop shop;
   Program program = shop.start({"eval"}, leave_standard_input_open);
   ASSERT_TRUE(program.signal_when(into(program, 0), SIGTERM));
   EXPECT_LE(interrupt(program, SIGTERM, after(0.05)).seconds, 0.3);
@@ -197,7 +189,7 @@ TEST(SignalsEndToEnd, ASecondSignalEndsAtOnce) {
 
 // As under nohup, or in the background of a shell.
 TEST(SignalsEndToEnd, ASignalIgnoredOnStartStaysIgnored) {
-  const Workshop shop;
+  const BusyWorkshop shop;
   Program program = shop.start({"eval"}, [] {
     leave_standard_input_open();
     ::signal(SIGINT, SIG_IGN);
@@ -207,7 +199,7 @@ TEST(SignalsEndToEnd, ASignalIgnoredOnStartStaysIgnored) {
 }
 
 TEST(SignalsEndToEnd, StandardErrorThatNobodyReadsHoldsNothingUp) {
-  const Workshop shop;
+  const BusyWorkshop shop;
   const auto closed_pipe = [] {
     leave_standard_input_open();
     int ends[2];
@@ -259,7 +251,7 @@ std::vector<std::string> stages_built(const Json& report) {
 }
 
 TEST(SignalsEndToEnd, StagesGoOnFromFinishedChunks) {
-  const Workshop shop;
+  const BusyWorkshop shop;
   // Several chunks of transfer, each of which takes longer than it takes to notice the first.
   shop.write("chunks.toml", edited(kSmallFabric, "_paths = 4096", "_paths = 16384"));
   Program program = shop.start({"precompute", "chunks.toml"});
@@ -276,7 +268,7 @@ TEST(SignalsEndToEnd, StagesGoOnFromFinishedChunks) {
 }
 
 TEST(SignalsEndToEnd, RenderKeepsTheDataOfItsFabricsAndNothingOfThePicture) {
-  const Workshop shop;
+  const BusyWorkshop shop;
   Program program = shop.start({"render", "scene.toml", "-o", "out.exr", "--spp", "1000000"});
   interrupt(program, SIGINT, once_there_is(shop / "cache" / "pack", ".json"));
   for (const char* extension : {".exr", ".png"})
@@ -287,7 +279,7 @@ TEST(SignalsEndToEnd, RenderKeepsTheDataOfItsFabricsAndNothingOfThePicture) {
 }
 
 TEST(SignalsEndToEnd, RunKeepsFinishedPictures) {
-  const Workshop shop;
+  const BusyWorkshop shop;
   shop.write("scene.toml", edited(kSmallScene, "spp = 4", "spp = 2000"));
   Program program = shop.start({"run", "scene.toml"});
   interrupt(program, SIGTERM, once_there_is(shop / "cache" / "picture", ".exr"));
@@ -297,7 +289,7 @@ TEST(SignalsEndToEnd, RunKeepsFinishedPictures) {
 }
 
 TEST(SignalsEndToEnd, ChartGoesOnFromFinishedPictures) {
-  const Workshop shop;
+  const BusyWorkshop shop;
   Arguments chart = {"chart", "scene.toml",      "-o", "chart", "--quick", "--methods",
                      "path",  "--reference-spp", "200"};
   Program program = shop.start(chart);
@@ -314,7 +306,7 @@ TEST(SignalsEndToEnd, ChartGoesOnFromFinishedPictures) {
 }
 
 TEST(SignalsEndToEnd, AccuracyKeepsStagesAndNothingOfTheMeasurement) {
-  const Workshop shop;
+  const BusyWorkshop shop;
   Program program = shop.start({"accuracy", "fabric.toml"});
   interrupt(program, SIGINT, once_there_is(shop / "cache" / "pack", ".json"));
   EXPECT_EQ(files_in(shop / "cache" / "accuracy", ".json"), std::vector<fs::path>{});

@@ -2,6 +2,10 @@
 #define HEDDLE_TESTS_PIPELINE_SMALL_FABRIC_H_
 // A fabric that a test can take through all stages in seconds, and a flat scene of it.
 
+#include <gtest/gtest.h>
+
+#include <string>
+
 namespace heddle {
 
 /// About a thousand segments: several chunks of visibility and of transfer.
@@ -92,6 +96,15 @@ fabric = "fabric.toml"
 method = "exact"
 spp = 2
 )";
+
+/// The text with every `from` replaced; a test that finds none fails.
+inline std::string edited(std::string text, const std::string& from, const std::string& to) {
+  std::size_t at = text.find(from);
+  EXPECT_NE(at, std::string::npos) << from;
+  for (; at != std::string::npos; at = text.find(from, at + to.size()))
+    text.replace(at, from.size(), to);
+  return text;
+}
 
 }  // namespace heddle
 

@@ -12,8 +12,6 @@
 namespace heddle {
 namespace {
 
-constexpr int kN = VisibilityMaps::kResolution;
-
 // Every segment has its own round hole of 35 degrees about a random axis; the last sees nothing.
 VisibilityMaps holes(std::size_t count, bool both_sides) {
   VisibilityMaps maps;
@@ -21,7 +19,7 @@ VisibilityMaps holes(std::size_t count, bool both_sides) {
   maps.words.assign(count * maps.words_per_map(), 0);
   maps.sees_nothing.assign(count, 0);
   maps.sees_nothing.back() = 1;
-  const LatLongGrid grid(kN);
+  const LatLongGrid grid(VisibilityMaps::kResolution);
   for (std::size_t s = 0; s + 1 < count; ++s) {
     RandomStream random(3, RandomStage::kTest, s, 0);
     const double z =
@@ -29,8 +27,13 @@ VisibilityMaps holes(std::size_t count, bool both_sides) {
     const double azimuth = 2 * kPi * random.uniform_double();
     const Vec3d axis(std::sqrt(1 - z * z) * std::cos(azimuth),
                      std::sqrt(1 - z * z) * std::sin(azimuth), z);
-    for (int cell = 0; cell < (both_sides ? kN * kN : kN * kN / 2); ++cell) {
-      if (axis.dot(grid.centre(cell / kN, cell % kN)) < std::cos(radians(35))) continue;
+    for (int cell = 0;
+         cell < (both_sides ? VisibilityMaps::kResolution * VisibilityMaps::kResolution
+                            : VisibilityMaps::kResolution * VisibilityMaps::kResolution / 2);
+         ++cell) {
+      if (axis.dot(grid.centre(cell / VisibilityMaps::kResolution,
+                               cell % VisibilityMaps::kResolution)) < std::cos(radians(35)))
+        continue;
       maps.words[s * maps.words_per_map() + static_cast<std::size_t>(cell / 64)] |= std::uint64_t{1}
                                                                                     << (cell % 64);
     }
@@ -43,7 +46,7 @@ VisibilityMaps holes(std::size_t count, bool both_sides) {
 // apart.
 TEST(SgFit, StoredGaussiansStandForTheMap) {
   const double light = 20;
-  const LatLongGrid grid(kN);
+  const LatLongGrid grid(VisibilityMaps::kResolution);
   for (const bool both_sides : {false, true}) {
     const VisibilityMaps maps = holes(12, both_sides);
     VisibilitySettings settings;
@@ -66,10 +69,14 @@ TEST(SgFit, StoredGaussiansStandForTheMap) {
       for (const Vec3d& direction : fibonacci_axes(FibonacciSet::kSphere, 30)) {
         if (!both_sides && direction.z() < 0) continue;
         double truth = 0;
-        for (int cell = 0; cell < kN * kN; ++cell) {
-          if (!map.open(cell / kN, cell % kN)) continue;
-          truth += grid.solid_angle(cell / kN) *
-                   sg_value({direction, light}, grid.centre(cell / kN, cell % kN)) / sg_mass(light);
+        for (int cell = 0; cell < VisibilityMaps::kResolution * VisibilityMaps::kResolution;
+             ++cell) {
+          if (!map.open(cell / VisibilityMaps::kResolution, cell % VisibilityMaps::kResolution))
+            continue;
+          truth += grid.solid_angle(cell / VisibilityMaps::kResolution) *
+                   sg_value({direction, light}, grid.centre(cell / VisibilityMaps::kResolution,
+                                                            cell % VisibilityMaps::kResolution)) /
+                   sg_mass(light);
         }
         error += std::abs(sg_sum_integral(axes, weights, sgs.sharpness, direction, light) - truth);
         total += truth;

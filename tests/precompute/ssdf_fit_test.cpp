@@ -16,8 +16,7 @@
 namespace heddle {
 namespace {
 
-constexpr int kN = VisibilityMaps::kResolution;
-constexpr int kCells = kN * kN;
+constexpr int kCells = VisibilityMaps::kResolution * VisibilityMaps::kResolution;
 
 const VisibilityMaps& fabric_maps() {
   static const VisibilityMaps maps = [] {
@@ -45,7 +44,7 @@ VisibilityMaps seeing_maps(std::size_t count) {
 
 Eigen::ArrayXd limited_distance(const SphericalMap& map) {
   std::vector<float> distance(kCells);
-  const SignedDistanceTransform transform(kN);
+  const SignedDistanceTransform transform(VisibilityMaps::kResolution);
   transform(map, distance.data());
   return Eigen::Map<const Eigen::ArrayXf>(distance.data(), kCells)
       .cast<double>()
@@ -70,9 +69,11 @@ Eigen::ArrayXd reconstruction(const SsdfVisibility& ssdf, std::size_t segment) {
 
 // Solid angle of every cell, 0 for those that the components leave out.
 Eigen::ArrayXd cell_weights() {
-  const LatLongGrid grid(kN);
+  const LatLongGrid grid(VisibilityMaps::kResolution);
   Eigen::ArrayXd weights = Eigen::ArrayXd::Zero(kCells);
-  for (int cell = 0; cell < (kN / 2 + 2) * kN; ++cell) weights[cell] = grid.solid_angle(cell / kN);
+  for (int cell = 0; cell < (VisibilityMaps::kResolution / 2 + 2) * VisibilityMaps::kResolution;
+       ++cell)
+    weights[cell] = grid.solid_angle(cell / VisibilityMaps::kResolution);
   return weights;
 }
 
@@ -145,7 +146,9 @@ TEST(SsdfFitStability, SegmentsOutsideTheSubset) {
       const SphericalMap map = maps.map(s);
       const Eigen::ArrayXd distance = reconstruction(ssdf, s);
       for (int cell = 0; cell < kCells / 2; ++cell) {
-        if ((distance[cell] > 0) != map.open(cell / kN, cell % kN)) wrong += weights[cell];
+        if ((distance[cell] > 0) !=
+            map.open(cell / VisibilityMaps::kResolution, cell % VisibilityMaps::kResolution))
+          wrong += weights[cell];
       }
     }
     return wrong / (2 * kPi * segments);

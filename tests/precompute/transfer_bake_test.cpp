@@ -13,6 +13,7 @@
 #include "fibers/tracing/path_walk.h"
 #include "fibers/tracing/tile_trace.h"
 #include "tests/support/fabrics.h"
+#include "tests/support/fibers.h"
 
 namespace heddle {
 namespace {
@@ -162,12 +163,7 @@ Exemplar filaments() {
     for (int z = 0; z < 4; ++z)
       places.emplace_back(0.03F * (static_cast<float>(y) + 0.5F), 0.03F * static_cast<float>(z));
   }
-  FiberScattering silk;
-  silk.color_r = Rgbd(0.7, 0.2, 0.1);
-  silk.color_tt = Rgbd(0.6, 0.5, 0.5);
-  silk.beta_r = radians(1);
-  silk.beta_tt = radians(10);
-  silk.gamma_tt = radians(20);
+  const FiberScattering silk = test::fiber_in_degrees({.7, .2, .1}, {.6, .5, .5}, 1, 10, 20);
   Exemplar exemplar = test::straight_fibers(0.6F, 0.18F, places, 0.01F, 12, silk);
   RandomStream random(5, RandomStage::kTest, 1, 0);
   // Both ends of a fiber stay where they are: it is periodic.

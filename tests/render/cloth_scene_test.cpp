@@ -7,6 +7,7 @@
 #include "fibers/math/random.h"
 #include "fibers/math/sampling.h"
 #include "fibers/tracing/tile_trace.h"
+#include "tests/support/fibers.h"
 #include "tests/support/small_exemplars.h"
 
 namespace heddle {
@@ -156,7 +157,7 @@ TEST(ClothScene, UnderlayIsJustBelowTheFibers) {
 
 TEST(ClothScene, PiecesOfOneFabricShareTheirMaterials) {
   const auto one = small_tile();
-  const auto other = std::make_shared<TileScene>(single_fiber(white_isotropic()));
+  const auto other = std::make_shared<TileScene>(single_fiber(test::white_fiber()));
   const ClothScene scene(
       {{one, flat_cloth(1, 1)}, {other, flat_cloth(1, 1)}, {one, flat_cloth(1, 1)}}, {});
   EXPECT_EQ(scene.materials().size(), 2U);

@@ -7,13 +7,10 @@
 #include "fibers/math/random.h"
 #include "fibers/math/sampling.h"
 #include "fibers/math/spherical_gaussian.h"
+#include "tests/support/pictures.h"
 
 namespace heddle {
 namespace {
-
-Light sg_light(const Vec3& axis, float sharpness, const Rgb& irradiance) {
-  return {LightType::kSphericalGaussian, axis.normalized(), sharpness, irradiance};
-}
 
 EnvironmentMap map_of(const std::vector<Light>& lights, int width, int height) {
   std::vector<Rgb> radiance(static_cast<std::size_t>(width * height), Rgb::Zero());
@@ -46,7 +43,7 @@ double relative_error(const EnvironmentMap& map, const std::vector<Light>& light
 }
 
 TEST(EnvironmentSgs, FindsOneGaussian) {
-  const Light light = sg_light({1, -2, 0.5F}, 40, {3, 2, 1});
+  const Light light = test::sg_light({1, -2, 0.5F}, 40, {3, 2, 1});
   const EnvironmentSgs fit = fit_environment_sgs(map_of({light}, 128, 64), 1);
   ASSERT_EQ(fit.lights.size(), 1U);
   EXPECT_LT(fit.relative_error, 2e-3);  // a blurred Gaussian is not quite one
@@ -58,8 +55,8 @@ TEST(EnvironmentSgs, FindsOneGaussian) {
 
 TEST(EnvironmentSgs, FindsSeveralOnTopOfAConstant) {
   const std::vector<Light> lights = {
-      sg_light({0, 0, 1}, 0, {20, 20, 30}), sg_light({1, 0, 1}, 30, {6, 5, 4}),
-      sg_light({-1, 1, 0.2F}, 90, {3, 3, 3}), sg_light({0, -1, 0}, 8, {0, 4, 8})};
+      test::sg_light({0, 0, 1}, 0, {20, 20, 30}), test::sg_light({1, 0, 1}, 30, {6, 5, 4}),
+      test::sg_light({-1, 1, 0.2F}, 90, {3, 3, 3}), test::sg_light({0, -1, 0}, 8, {0, 4, 8})};
   const EnvironmentSgs fit = fit_environment_sgs(map_of(lights, 256, 128), 4);
   EXPECT_LT(fit.relative_error, 5e-3);  // the constant's sharpness stays a little above 0
   EXPECT_NEAR(fit.lights[0].irradiance[2], 30, 0.3);
@@ -67,12 +64,12 @@ TEST(EnvironmentSgs, FindsSeveralOnTopOfAConstant) {
 
 EnvironmentMap busy_map() {
   RandomStream random(7, RandomStage::kTest, 0, 0);
-  std::vector<Light> lights = {sg_light({0, 0, 1}, 1, {5, 6, 8})};
+  std::vector<Light> lights = {test::sg_light({0, 0, 1}, 1, {5, 6, 8})};
   for (int k = 0; k < 30; ++k) {
     const Vec3 axis = sample_sphere(random);
     const float sharpness = 5 * std::exp2(3 * random.uniform());
     lights.push_back(
-        sg_light(axis, sharpness, Rgb(random.uniform(), random.uniform(), random.uniform())));
+        test::sg_light(axis, sharpness, Rgb(random.uniform(), random.uniform(), random.uniform())));
   }
   return map_of(lights, 96, 48);
 }

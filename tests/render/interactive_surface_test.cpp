@@ -8,13 +8,14 @@
 #include "render/path_tracer.h"
 #include "render/precomputed_renderer.h"
 #include "render/surface/surface_presets.h"
+#include "tests/support/pictures.h"
 #include "tests/support/small_exemplars.h"
 
 namespace heddle {
 namespace {
 
-MicrocylinderFabric linen() {
-  const TomlTable document = surface_preset("linen-plain");
+MicrocylinderFabric linen_preset() {
+  const TomlTable document = surface_preset("linen_preset-plain");
   return read_microcylinder_fabric(document);
 }
 
@@ -23,7 +24,7 @@ std::shared_ptr<const InteractiveMicrocylinder> interactive_linen() {
     InteractiveSettings settings;
     settings.table.columns = 16;
     settings.table.rows = 8;
-    return std::make_shared<const InteractiveMicrocylinder>(linen(), settings);
+    return std::make_shared<const InteractiveMicrocylinder>(linen_preset(), settings);
   }();
   return model;
 }
@@ -46,17 +47,6 @@ Light gaussian(const Vec3& axis, float sharpness) {
   return {LightType::kSphericalGaussian, axis.normalized(), sharpness, Rgb(1, 2, 3)};
 }
 
-const auto kNoProgress = [](double) {};
-
-Camera camera_from(const Vec3d& position, double wide, int pixels) {
-  CameraConfig config;
-  config.position = position;
-  config.up = Vec3d(0, 1, 0);
-  config.fov = 2 * std::atan(0.5 * wide / position.norm());
-  config.width = config.height = pixels;
-  return Camera(config);
-}
-
 /// Relative RMSE of the interactive picture of all surfaces against a path-traced one.
 double picture_error(const ClothScene& scene, const std::vector<Light>& lights,
                      const Camera& camera, int spp) {
@@ -66,8 +56,8 @@ double picture_error(const ClothScene& scene, const std::vector<Light>& lights,
   const PrecomputedRenderer renderer(scene, {}, lights, Rgb(0, 0, 0), settings);
   const PathTracer tracer(scene, {}, lights, Rgb(0, 0, 0), {});
   const PixelRect all = {0, 0, camera.width(), camera.height()};
-  const FrameBuffers ours = shade_picture(renderer, camera, all, 8, kNoProgress);
-  const FrameBuffers truth = trace_picture(tracer, camera, all, 7, {spp, {}}, kNoProgress);
+  const FrameBuffers ours = shade_picture(renderer, camera, all, 8, test::no_progress);
+  const FrameBuffers truth = trace_picture(tracer, camera, all, 7, {spp, {}}, test::no_progress);
   double error = 0;
   double mean = 0;
   for (std::size_t k = 0; k < ours.pixel_count(); ++k) {
@@ -86,12 +76,12 @@ TEST(InteractiveSurfaceAgreement, APictureIsNearThePathTracedOne) {
   const TriangleMesh roof{{Vec3(0.5F, -3, 1), Vec3(4, -3, 1), Vec3(4, 3, 1), Vec3(0.5F, 3, 1)},
                           {{0, 1, 2}, {0, 2, 3}}};
   const std::vector<SurfaceCloth> cloth = {
-      {read_surface_model(surface_preset("linen-plain")), flat_cloth(4, 4, 24)}};
+      {read_surface_model(surface_preset("linen_preset-plain")), flat_cloth(4, 4, 24)}};
   const ClothScene open({}, {}, cloth);
   const ClothScene covered({}, {roof}, cloth);
   const std::vector<Light> lights = {gaussian({-0.3F, 0.2F, 1}, 60),
                                      gaussian({0.6F, -0.6F, 1}, 200)};
-  const Camera camera = camera_from({-0.5, 0.3, 40}, 2, 8);
+  const Camera camera = test::camera_from({-0.5, 0.3, 40}, 2, 8);
   const double in_the_open = picture_error(open, lights, camera, 1024);
   const double under_the_roof = picture_error(covered, lights, camera, 1024);
   std::printf("  relative RMSE: open %.4f, under a roof %.4f\n", in_the_open, under_the_roof);
@@ -104,7 +94,7 @@ TEST(InteractiveSurface, BothSidesShowTheFaceWithTheirOwnShadows) {
   const TriangleMesh floor{{Vec3(-90, -90, -0.5F), Vec3(90, -90, -0.5F), Vec3(0, 90, -0.5F)},
                            {{0, 1, 2}}};
   const std::vector<SurfaceCloth> cloth = {
-      {read_surface_model(surface_preset("linen-plain")), flat_cloth(4, 4, 4)}};
+      {read_surface_model(surface_preset("linen_preset-plain")), flat_cloth(4, 4, 4)}};
   const ClothScene scene({}, {floor}, cloth);
   const ClothScene open({}, {}, cloth);
   const auto light_on = [](const ClothScene& in, float side, const Light& light) {
@@ -130,7 +120,7 @@ TEST(InteractiveSurface, ShellsOfFibersHideLight) {
   const auto tile = std::make_shared<TileScene>(single_fiber(test_cotton()));
   const ClothScene scene(
       {{tile, lifted(flat_cloth(30, 30), {0, 0, 1})}}, {},
-      {{read_surface_model(surface_preset("linen-plain")), flat_cloth(2, 2, 2)}});
+      {{read_surface_model(surface_preset("linen_preset-plain")), flat_cloth(2, 2, 2)}});
   const DistanceMaps maps = bake_distance_maps(scene, scene.surfaces()[0], ClothSide::kFace);
   EXPECT_LT(maps.evaluate(maps.coefficients(4), Vec3d(0, 0, 1)).distance, -radians(60));
 }

@@ -11,19 +11,10 @@
 #include "fibers/math/random.h"
 #include "fibers/math/sampling.h"
 #include "fibers/math/spherical_gaussian.h"
+#include "tests/support/fibers.h"
 
 namespace heddle {
 namespace {
-
-FiberScattering broad_fiber() {
-  FiberScattering fiber;
-  fiber.color_r = Rgbd(0.3, 0.2, 0.1);
-  fiber.color_tt = Rgbd(0.9, 0.7, 0.4);
-  fiber.beta_r = radians(12);
-  fiber.beta_tt = radians(25);
-  fiber.gamma_tt = radians(35);
-  return fiber;
-}
 
 /// One cell whose matrix is `diagonal` times the identity in every colour.
 Transfer diagonal_transfer(int order, const std::array<float, 3>& diagonal, bool both_sides) {
@@ -90,7 +81,7 @@ TEST(WoSpace, IsARotationWithTangentAndViewerInItsPlane) {
 TEST(MultipleScatteringLaw, ConstantFieldGivesTheFibersWholeResponse) {
   // Light 1 from everywhere is sqrt(4 pi) in band 0 alone: the outgoing radiance is the integral of
   // S cos(theta_i), exactly.
-  const FiberScattering fiber = broad_fiber();
+  const FiberScattering fiber = test::broad_fiber();
   const std::vector<BcsdfTable> materials = {BcsdfTable(fiber)};
   const Transfer transfer = diagonal_transfer(5, {1, 1, 1}, true);
   const MultipleScattering multiple(transfer, materials);
@@ -113,7 +104,7 @@ TEST(MultipleScatteringLaw, ConstantFieldGivesTheFibersWholeResponse) {
 TEST(MultipleScatteringAgreement, RotatedDotProductEqualsQuadratureOfTheTruncatedField) {
   // An identity matrix hands the light's own expansion on as the incoming field: sum of Y_j(light)
   // Y_j(wi), in colours.
-  const FiberScattering fiber = broad_fiber();
+  const FiberScattering fiber = test::broad_fiber();
   const std::vector<BcsdfTable> materials = {BcsdfTable(fiber)};
   for (const int order : {0, 2, 5}) {
     const Transfer transfer = diagonal_transfer(order, {1.0F, 0.5F, 0.25F}, true);
@@ -286,7 +277,7 @@ Transfer cone_transfer(const std::vector<float>& moments) {
 }
 
 TEST(MultipleScatteringAgreement, LightOnConesEqualsQuadratureOfItsModel) {
-  FiberScattering fiber = broad_fiber();
+  FiberScattering fiber = test::broad_fiber();
   fiber.beta_r = radians(4);
   fiber.beta_tt = radians(10);
   const std::vector<BcsdfTable> materials = {BcsdfTable(fiber)};

@@ -8,15 +8,13 @@
 
 #include "fibers/math/quadrature.h"
 #include "fibers/math/spherical_gaussian.h"
+#include "tests/support/fibers.h"
+#include "tests/support/pictures.h"
 #include "tests/support/small_exemplars.h"
 #include "tests/support/statistics.h"
 
 namespace heddle {
 namespace {
-
-Light sg_light(const Vec3& axis, float sharpness, const Rgb& irradiance) {
-  return {LightType::kSphericalGaussian, axis.normalized(), sharpness, irradiance};
-}
 
 struct World {
   std::unique_ptr<ClothScene> scene;
@@ -94,9 +92,9 @@ Means measure(const PathTracer& tracer, int samples, std::uint64_t seed) {
 // the geometry of occlusion.
 TEST(PathTracerLaw, Furnace) {
   const std::vector<Light> light = {
-      sg_light({0, 0, 1}, 0, Rgb(1, 1, 1) * static_cast<float>(4 * kPi))};
+      test::sg_light({0, 0, 1}, 0, Rgb(1, 1, 1) * static_cast<float>(4 * kPi))};
   for (const bool curved : {false, true}) {
-    const World world = make_world(crossed_layers(white_isotropic()),
+    const World world = make_world(crossed_layers(test::white_fiber()),
                                    {curved ? curved_patch() : flat_cloth(6, 6)}, light);
     const Means escapes = measure(world.tracer(LightEstimator::kEscapes), 2000, 1);
     EXPECT_NEAR(escapes.total[0].mean(), 1, 1e-4);
@@ -116,15 +114,15 @@ TEST(PathTracerLaw, Furnace) {
 // either shows.
 TEST(PathTracerLaw, FurnaceSeesALostBounce) {
   const std::vector<Light> light = {
-      sg_light({0, 0, 1}, 0, Rgb(1, 1, 1) * static_cast<float>(4 * kPi))};
-  const World world = make_world(crossed_layers(white_isotropic()), {flat_cloth(6, 6)}, light);
+      test::sg_light({0, 0, 1}, 0, Rgb(1, 1, 1) * static_cast<float>(4 * kPi))};
+  const World world = make_world(crossed_layers(test::white_fiber()), {flat_cloth(6, 6)}, light);
   EXPECT_LT(measure(world.tracer(LightEstimator::kCombined, false, 10), 2000, 3).total[0].mean(),
             0.99);
 }
 
 TEST(PathTracerStatistical, EstimatorsAgreeUnderASharpGaussian) {
   const World world = make_world(crossed_layers(test_cotton()), {curved_patch()},
-                                 {sg_light({-0.4F, 0.3F, 1}, 150, Rgb(3, 3, 3))});
+                                 {test::sg_light({-0.4F, 0.3F, 1}, 150, Rgb(3, 3, 3))});
   const Means shadow = measure(world.tracer(LightEstimator::kShadowRays), 40000, 4);
   const Means escapes = measure(world.tracer(LightEstimator::kEscapes), 200000, 5);
   const Means combined = measure(world.tracer(LightEstimator::kCombined), 40000, 6);
@@ -143,7 +141,7 @@ TEST(PathTracerStatistical, AVerySharpGaussianIsADirectionalLight) {
   const Vec3 axis = Vec3(-0.4F, 0.3F, 1).normalized();
   const Rgb irradiance(2, 3, 4);
   const World sharp = make_world(crossed_layers(test_cotton()), {curved_patch()},
-                                 {sg_light(axis, 1e5F, irradiance)});
+                                 {test::sg_light(axis, 1e5F, irradiance)});
   const World directional = make_world(crossed_layers(test_cotton()), {curved_patch()},
                                        {{LightType::kDirectional, axis, 0, irradiance}});
   const Means a = measure(sharp.tracer(LightEstimator::kCombined), 40000, 7);
@@ -159,7 +157,7 @@ TEST(PathTracerStatistical, AVerySharpGaussianIsADirectionalLight) {
 // integral over the light.
 TEST(PathTracerStatistical, SingleFiberAgainstQuadrature) {
   const FiberScattering fiber = test_cotton();
-  const Light light = sg_light({0.3F, 0.5F, 0.8F}, 20, Rgb(1, 2, 3));
+  const Light light = test::sg_light({0.3F, 0.5F, 0.8F}, 20, Rgb(1, 2, 3));
   // The swatch is turned, so that the fiber's tangent (fabric y) is a general direction of the
   // world.
   const Mat3d turn = Eigen::AngleAxisd(0.7, Vec3d(1, 2, 3).normalized()).toRotationMatrix();
@@ -248,7 +246,7 @@ CameraConfig small_camera() {
 FrameBuffers small_picture(const PixelRect& crop, int spp, const MoreSamples& more = {},
                            int enlarged = 1) {
   const World world = make_world(crossed_layers(test_cotton()), {curved_patch()},
-                                 {sg_light({-0.4F, 0.3F, 1}, 150, Rgb(3, 3, 3)),
+                                 {test::sg_light({-0.4F, 0.3F, 1}, 150, Rgb(3, 3, 3)),
                                   {LightType::kDirectional, Vec3(0.6F, 0, 0.8F), 0, Rgb(1, 1, 1)}});
   const PathTracer tracer = world.tracer(LightEstimator::kCombined);
   CameraConfig camera = small_camera();

@@ -9,6 +9,8 @@
 
 #include "fibers/math/sampling.h"
 #include "formats/input_error.h"
+#include "tests/support/fibers.h"
+#include "tests/support/pictures.h"
 #include "tests/support/small_exemplars.h"
 
 namespace heddle {
@@ -96,7 +98,7 @@ TriangleMesh half_roof() {
           {{0, 1, 2}, {0, 2, 3}}};
 }
 
-struct World {
+struct PackWorld {
   FabricPack pack;
   std::unique_ptr<ClothScene> scene;
   std::vector<const FabricPack*> packs;
@@ -107,9 +109,9 @@ struct World {
   }
 };
 
-std::unique_ptr<World> make_world(FabricPack pack, std::vector<Light> lights,
-                                  std::vector<TriangleMesh> meshes = {}) {
-  auto world = std::make_unique<World>();
+std::unique_ptr<PackWorld> make_world(FabricPack pack, std::vector<Light> lights,
+                                      std::vector<TriangleMesh> meshes = {}) {
+  auto world = std::make_unique<PackWorld>();
   world->pack = std::move(pack);
   std::vector<ClothPiece> pieces;
   pieces.push_back({std::make_shared<TileScene>(world->pack.exemplar), flat_cloth(6, 4)});
@@ -131,16 +133,14 @@ Camera camera_above(double wide, int width, int height) {
   return Camera(config);
 }
 
-const auto kNoProgress = [](double) {};
-
 TEST(PrecomputedRendererLaw, OpenFurnaceOfWhiteFibersIsOne) {
   // Light 1 from everywhere (irradiance 4 pi), handed on by an identity: the white isotropic fiber
   // shows 1, in every pixel on the cloth; nothing is seen by single scattering, whose lobes are all
   // dark.
   const auto world =
-      make_world(open_pack(white_isotropic(), true), {gaussian({0, 0, 1}, 0, 4 * kPif)});
-  const FrameBuffers frame =
-      shade_picture(world->renderer(), camera_above(1, 24, 16), {0, 0, 24, 16}, 2, kNoProgress);
+      make_world(open_pack(test::white_fiber(), true), {gaussian({0, 0, 1}, 0, 4 * kPif)});
+  const FrameBuffers frame = shade_picture(world->renderer(), camera_above(1, 24, 16),
+                                           {0, 0, 24, 16}, 2, test::no_progress);
   for (std::size_t k = 0; k < frame.pixel_count(); ++k) {
     EXPECT_EQ(frame.single[k].maxCoeff(), 0);
     if (frame.alpha[k] < 1) continue;
@@ -153,13 +153,13 @@ TEST(PrecomputedRendererLaw, RivalsShowTheOpenFurnaceAsOne) {
   // Nothing hides anything in this pack's signed distances, so single scattering of white fibers in
   // light 1 is 1.
   const auto world =
-      make_world(open_pack(white_isotropic(), true), {gaussian({0, 0, 1}, 0, 4 * kPif)});
+      make_world(open_pack(test::white_fiber(), true), {gaussian({0, 0, 1}, 0, 4 * kPif)});
   for (const RenderMethod method :
        {RenderMethod::kPrt, RenderMethod::kTsaiShih16, RenderMethod::kTsaiShihFull}) {
     PrecomputedSettings settings;
     settings.method = method;
     const FrameBuffers frame = shade_picture(world->renderer(settings), camera_above(1, 12, 8),
-                                             {0, 0, 12, 8}, 1, kNoProgress);
+                                             {0, 0, 12, 8}, 1, test::no_progress);
     for (std::size_t k = 0; k < frame.pixel_count(); ++k) {
       if (frame.alpha[k] < 1) continue;
       EXPECT_LT((frame.single[k] - 1).abs().maxCoeff(), 0.01);  // 1 %: weak lobes left out
@@ -180,9 +180,9 @@ TEST(PrecomputedRenderer, DualScatteringNeedsNothingBaked) {
   PrecomputedSettings settings;
   settings.method = RenderMethod::kDualScattering;
   const FrameBuffers dual =
-      shade_picture(world->renderer(settings), camera, {0, 0, 16, 16}, 1, kNoProgress);
+      shade_picture(world->renderer(settings), camera, {0, 0, 16, 16}, 1, test::no_progress);
   const FrameBuffers open =
-      shade_picture(shipped->renderer(), camera, {0, 0, 16, 16}, 1, kNoProgress);
+      shade_picture(shipped->renderer(), camera, {0, 0, 16, 16}, 1, test::no_progress);
   int lit = 0;
   for (std::size_t k = 0; k < dual.pixel_count(); ++k) {
     if (dual.alpha[k] < 1) continue;
@@ -200,7 +200,8 @@ TEST(PrecomputedRenderer, SingleScatteringIsTheBcsdfAtTheFiberSeen) {
   const Vec3 towards = Vec3(0.4F, 0.1F, 1).normalized();
   const auto world = make_world(open_pack(cotton), {directional(towards, 2)});
   const Camera camera = camera_above(0.02, 5, 5);  // 4 um per pixel
-  const FrameBuffers frame = shade_picture(world->renderer(), camera, {0, 0, 5, 5}, 1, kNoProgress);
+  const FrameBuffers frame =
+      shade_picture(world->renderer(), camera, {0, 0, 5, 5}, 1, test::no_progress);
   int checked = 0;
   for (int y = 0; y < 5; ++y) {
     for (int x = 0; x < 5; ++x) {
@@ -227,14 +228,14 @@ TEST(PrecomputedRendererLaw, ShadowOfARoofIsHardInSingleAndGaussianInMultipleSca
   // The roof's edge is at x = 0 and the light straight above. Share of light at x: a step, and the
   // normal distribution function Phi(-x / sigma).
   const auto world =
-      make_world(open_pack(white_isotropic()), {directional({0, 0, 1}, 1)}, {half_roof()});
+      make_world(open_pack(test::white_fiber()), {directional({0, 0, 1}, 1)}, {half_roof()});
   PrecomputedSettings settings;
   settings.shadow_sigma_mm = 0.1;
   const FrameBuffers shaded = shade_picture(world->renderer(settings), camera_above(0.8, 32, 24),
-                                            {0, 0, 32, 24}, 16, kNoProgress);
-  const auto open = make_world(open_pack(white_isotropic()), {directional({0, 0, 1}, 1)});
+                                            {0, 0, 32, 24}, 16, test::no_progress);
+  const auto open = make_world(open_pack(test::white_fiber()), {directional({0, 0, 1}, 1)});
   const FrameBuffers lit = shade_picture(open->renderer(settings), camera_above(0.8, 32, 24),
-                                         {0, 0, 32, 24}, 16, kNoProgress);
+                                         {0, 0, 32, 24}, 16, test::no_progress);
   double worst = 0;
   for (int x = 0; x < 32; ++x) {
     double multiple = 0;
@@ -270,8 +271,8 @@ TEST(PrecomputedRenderer, LightFromBelowLeavesClothLitFromTheFaceDark) {
   for (const bool both_sides : {false, true}) {
     for (const Light& light : {directional({0.1F, 0, -1}, 1), gaussian({0.1F, 0, -1}, 500, 1)}) {
       const auto world = make_world(open_pack(test_cotton(), both_sides), {light});
-      const FrameBuffers frame =
-          shade_picture(world->renderer(), camera_above(1, 8, 8), {0, 0, 8, 8}, 2, kNoProgress);
+      const FrameBuffers frame = shade_picture(world->renderer(), camera_above(1, 8, 8),
+                                               {0, 0, 8, 8}, 2, test::no_progress);
       float brightest = 0;
       for (std::size_t k = 0; k < frame.pixel_count(); ++k) {
         brightest = std::max(brightest, (frame.single[k] + frame.multiple[k]).maxCoeff());
@@ -283,8 +284,8 @@ TEST(PrecomputedRenderer, LightFromBelowLeavesClothLitFromTheFaceDark) {
 
 TEST(PrecomputedRenderer, BackgroundAndAlphaFillWhatTheClothLeaves) {
   const auto world = make_world(open_pack(test_cotton()), {directional({0, 0, 1}, 1)});
-  const FrameBuffers frame =
-      shade_picture(world->renderer(), camera_above(20, 20, 20), {0, 0, 20, 20}, 4, kNoProgress);
+  const FrameBuffers frame = shade_picture(world->renderer(), camera_above(20, 20, 20),
+                                           {0, 0, 20, 20}, 4, test::no_progress);
   int covered = 0;
   int empty = 0;
   for (std::size_t k = 0; k < frame.pixel_count(); ++k) {
@@ -309,11 +310,11 @@ TEST(PrecomputedRenderer, ALowerOrderIsThatOfDataCutToIt) {
   for (float& value : transfer.matrices) value = random.uniform();
   transfer.standard_error.assign(std::size_t{3} * 3, 0);
   const std::vector<Light> lights = {directional({0.3F, 0.2F, 1}, 1)};
-  const auto shown = [](const World& world, std::optional<int> order) {
+  const auto shown = [](const PackWorld& world, std::optional<int> order) {
     const PrecomputedSettings settings{
         .shadow_sigma_mm = {}, .blend = {}, .transfer_order = order, .interactive = {}};
     return shade_picture(world.renderer(settings), camera_above(1, 8, 8), {0, 0, 8, 8}, 2,
-                         kNoProgress)
+                         test::no_progress)
         .multiple;
   };
   const auto whole = make_world(pack, lights);
@@ -336,9 +337,9 @@ TEST(PrecomputedRendererAgreement, VolumeSeesWhatFibersShow) {
   settings.method = RenderMethod::kVolume;
   const Camera camera = camera_above(0.5, 48, 48);
   const FrameBuffers fibers =
-      shade_picture(world->renderer(), camera, {0, 0, 48, 48}, 1, kNoProgress);
+      shade_picture(world->renderer(), camera, {0, 0, 48, 48}, 1, test::no_progress);
   const FrameBuffers volume =
-      shade_picture(world->renderer(settings), camera, {0, 0, 48, 48}, 1, kNoProgress);
+      shade_picture(world->renderer(settings), camera, {0, 0, 48, 48}, 1, test::no_progress);
   int both = 0;
   int same_fiber = 0;
   int near = 0;
@@ -408,10 +409,10 @@ TEST(PrecomputedRendererEndToEnd, MoreSamplesMakeThePictureOfAll) {
                  {directional({0.3F, 0.2F, 1}, 1), gaussian({-0.5F, 0, 1}, 150, 2)}, {half_roof()});
   const Camera camera = camera_above(2, 20, 20);
   const FrameBuffers whole =
-      shade_picture(world->renderer(), camera, {0, 0, 20, 20}, 13, kNoProgress);
+      shade_picture(world->renderer(), camera, {0, 0, 20, 20}, 13, test::no_progress);
   std::vector<int> seen;
   const FrameBuffers grown = shade_picture(world->renderer(), camera, {0, 0, 20, 20}, 3,
-                                           kNoProgress, [&](const FrameBuffers& frame) {
+                                           test::no_progress, [&](const FrameBuffers& frame) {
                                              seen.push_back(frame.spp);
                                              return 13 - frame.spp;
                                            });
@@ -433,7 +434,7 @@ TEST(PrecomputedRendererEndToEnd, SameBytesForAnyThreadsAndCrop) {
   const Camera camera = camera_above(2, 50, 40);
   const auto render = [&](std::size_t threads, const PixelRect& crop) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-    return shade_picture(world->renderer(), camera, crop, 3, kNoProgress);
+    return shade_picture(world->renderer(), camera, crop, 3, test::no_progress);
   };
   const FrameBuffers one = render(1, {0, 0, 50, 40});
   const FrameBuffers two = render(2, {0, 0, 50, 40});

@@ -10,19 +10,10 @@
 #include "fibers/math/random.h"
 #include "fibers/math/sampling.h"
 #include "fibers/math/spherical_gaussian.h"
+#include "tests/support/fibers.h"
 
 namespace heddle {
 namespace {
-
-FiberScattering broad_fiber() {
-  FiberScattering fiber;
-  fiber.color_r = Rgbd(0.3, 0.2, 0.1);
-  fiber.color_tt = Rgbd(0.9, 0.7, 0.4);
-  fiber.beta_r = radians(10);
-  fiber.beta_tt = radians(20);
-  fiber.gamma_tt = radians(30);
-  return fiber;
-}
 
 /// Two segments with the same signed distance d(direction) on the map's pixels; segment 1 sees
 /// nothing.
@@ -98,7 +89,7 @@ Rgbd integrate_about(const Vec3& axis, double sharpness,
 }
 
 TEST(SingleScattering, DirectionalLightIsTheBcsdfWhereTheDistanceIsPositive) {
-  const FiberScattering fiber = broad_fiber();
+  const FiberScattering fiber = test::broad_fiber();
   const std::vector<BcsdfTable> materials = {BcsdfTable(fiber)};
   const SsdfVisibility ssdf = make_ssdf(upper_half_space);
   const SingleScattering single(&ssdf, nullptr, materials);
@@ -127,7 +118,7 @@ TEST(SingleScattering, DirectionalLightIsTheBcsdfWhereTheDistanceIsPositive) {
 // Directional light is cut where the distance is 0, not near it. The stored distance is linear in
 // the polar angle, which interpolation keeps: rounding only.
 TEST(SingleScatteringLaw, DirectionalLightIsCutAtTheEdgeItself) {
-  const std::vector<BcsdfTable> materials = {BcsdfTable(broad_fiber())};
+  const std::vector<BcsdfTable> materials = {BcsdfTable(test::broad_fiber())};
   const SsdfVisibility ssdf = make_ssdf(upper_half_space);
   const SingleScattering single(&ssdf, nullptr, materials);
   for (int i = 0; i < 200; ++i) {
@@ -145,7 +136,7 @@ TEST(SingleScatteringLaw, DirectionalLightIsCutAtTheEdgeItself) {
 }
 
 TEST(SingleScattering, VisibilityIsLookedUpInFabricSpaceAndScatteringInWorldSpace) {
-  const std::vector<BcsdfTable> materials = {BcsdfTable(broad_fiber())};
+  const std::vector<BcsdfTable> materials = {BcsdfTable(test::broad_fiber())};
   const SsdfVisibility ssdf = make_ssdf(upper_half_space);
   const SingleScattering single(&ssdf, nullptr, materials);
   const Vec3 up(0, 0, 1);
@@ -157,7 +148,7 @@ TEST(SingleScattering, VisibilityIsLookedUpInFabricSpaceAndScatteringInWorldSpac
 }
 
 TEST(SingleScatteringAgreement, SoftLightIsTheQuadratureOfLobesTimesLightTimesBcsdf) {
-  const FiberScattering fiber = broad_fiber();
+  const FiberScattering fiber = test::broad_fiber();
   const std::vector<BcsdfTable> materials = {BcsdfTable(fiber)};
   const SgVisibility lobes = make_lobes();
   const SingleScattering single(nullptr, &lobes, materials, kLobesOnly);
@@ -203,7 +194,7 @@ TEST(SingleScatteringAgreement, SoftLightIsTheQuadratureOfLobesTimesLightTimesBc
 }
 
 FiberScattering narrow_fiber() {
-  FiberScattering fiber = broad_fiber();
+  FiberScattering fiber = test::broad_fiber();
   fiber.beta_r = radians(2);
   fiber.beta_tt = radians(4);
   fiber.gamma_tt = radians(15);
@@ -249,9 +240,10 @@ TEST(SingleScatteringAgreement, LightOverAnEdgeIsCloseToQuadrature) {
   std::printf(
       "  sharpness: broad fiber, narrow fiber; in brackets looked up at the light's axis\n");
   for (const float sharpness : {10.0F, 30.0F, 100.0F, 300.0F, 2000.0F}) {
-    const double broad = error_over_an_edge(broad_fiber(), sharpness, SgMethod::kDefault);
+    const double broad = error_over_an_edge(test::broad_fiber(), sharpness, SgMethod::kDefault);
     const double narrow = error_over_an_edge(narrow_fiber(), sharpness, SgMethod::kDefault);
-    const double axis_broad = error_over_an_edge(broad_fiber(), sharpness, SgMethod::kPrinted);
+    const double axis_broad =
+        error_over_an_edge(test::broad_fiber(), sharpness, SgMethod::kPrinted);
     const double axis_narrow = error_over_an_edge(narrow_fiber(), sharpness, SgMethod::kPrinted);
     std::printf("  %5g: %.3f (%.3f), %.3f (%.3f)\n", static_cast<double>(sharpness), broad,
                 axis_broad, narrow, axis_narrow);
@@ -287,7 +279,7 @@ TEST(SingleScattering, SharpLightDoesNotDependOnHowTheClothLiesInSpace) {
 }
 
 TEST(SingleScattering, GammaIsThePrintedOneWhereAsked) {
-  const FiberScattering fiber = broad_fiber();
+  const FiberScattering fiber = test::broad_fiber();
   const SsdfVisibility ssdf = make_ssdf([](const Vec3d&) { return kPi; });
   const std::vector<BcsdfTable> materials = {BcsdfTable(fiber)};
   const SingleScattering printed(&ssdf, nullptr, materials, kPrintedBlend, SgMethod::kPrinted);
@@ -307,7 +299,7 @@ TEST(SingleScattering, GammaIsThePrintedOneWhereAsked) {
 }
 
 TEST(SingleScattering, BlendsLinearlyBetweenTheTwoRepresentations) {
-  const std::vector<BcsdfTable> materials = {BcsdfTable(broad_fiber())};
+  const std::vector<BcsdfTable> materials = {BcsdfTable(test::broad_fiber())};
   const SsdfVisibility open = make_ssdf([](const Vec3d&) { return kPi; });
   const SsdfVisibility closed = make_ssdf([](const Vec3d&) { return -kPi; });
   const SgVisibility lobes = make_lobes();

@@ -12,6 +12,7 @@
 #include "render/path_tracer.h"
 #include "render/precomputed_renderer.h"
 #include "render/surface/surface_presets.h"
+#include "tests/support/pictures.h"
 #include "tests/support/small_exemplars.h"
 #include "tests/support/statistics.h"
 
@@ -97,7 +98,7 @@ ClothMesh arch(int steps) {
 }
 
 /// Everything that both ways to render need.
-struct World {
+struct SurfaceWorld {
   std::unique_ptr<ClothScene> scene;
   std::vector<BcsdfTable> materials;
   std::vector<Light> lights;
@@ -110,9 +111,9 @@ struct World {
   PrecomputedRenderer renderer() const { return {*scene, {}, lights, Rgb(0, 0, 0), {}}; }
 };
 
-World make_world(std::vector<ClothPiece> fibers, std::vector<TriangleMesh> black,
-                 std::vector<SurfaceCloth> surfaces, std::vector<Light> lights) {
-  World world;
+SurfaceWorld make_world(std::vector<ClothPiece> fibers, std::vector<TriangleMesh> black,
+                        std::vector<SurfaceCloth> surfaces, std::vector<Light> lights) {
+  SurfaceWorld world;
   world.scene =
       std::make_unique<ClothScene>(std::move(fibers), std::move(black), std::move(surfaces));
   world.materials = scene_materials(*world.scene);
@@ -120,7 +121,7 @@ World make_world(std::vector<ClothPiece> fibers, std::vector<TriangleMesh> black
   return world;
 }
 
-World surface_world(const Model& model, const ClothMesh& mesh, std::vector<Light> lights) {
+SurfaceWorld surface_world(const Model& model, const ClothMesh& mesh, std::vector<Light> lights) {
   return make_world({}, {}, {SurfaceCloth(model, mesh)}, std::move(lights));
 }
 
@@ -129,22 +130,11 @@ EyeRay ray_to(const Vec3d& target, const Vec3& from) {
   return {target - 5 * direction.cast<double>(), direction};
 }
 
-Camera camera_from(const Vec3d& position, double wide, int pixels) {
-  CameraConfig config;
-  config.position = position;
-  config.up = Vec3d(0, 1, 0);
-  config.fov = 2 * std::atan(0.5 * wide / position.norm());
-  config.width = config.height = pixels;
-  return Camera(config);
-}
-
-const auto kNoProgress = [](double) {};
-
 TEST(SurfaceClothLaw, AFlatPatchUnderADirectionalLightIsTheModel) {
   for (const char* name : {"linen-plain", "silk-shot", "velvet"}) {
     const Model model = preset(name);
     const Light light = directional({0.4F, -0.3F, 1});
-    const World world = surface_world(model, flat_cloth(4, 4), {light});
+    const SurfaceWorld world = surface_world(model, flat_cloth(4, 4), {light});
     for (const Vec3& from : {Vec3(0.1F, 0.2F, 1), Vec3(-1, 0.5F, 0.4F)}) {
       const EyeRay ray = ray_to({0.3, -0.7, 0}, from);
       RandomStream random(1, RandomStage::kTest, 0, 0);
@@ -173,7 +163,7 @@ TEST(SurfaceClothStatistical, EstimatorsAgreeWithEachOtherAndWithTheLightsIntegr
     for (const float sharpness : {5.0F, 150.0F}) {
       const Model model = preset(name);
       const Light light = gaussian({0.5F, 0.1F, 1}, sharpness, Rgb(1, 1, 1));
-      const World world = surface_world(model, flat_cloth(4, 4), {light});
+      const SurfaceWorld world = surface_world(model, flat_cloth(4, 4), {light});
       const EyeRay ray = ray_to({0, 0, 0}, {-0.4F, 0.3F, 1});
       const Rgbd exact = model->reflected_sg({}, light.axis.cast<double>(), light.sharpness,
                                              -ray.direction.cast<double>());
@@ -197,7 +187,8 @@ TEST(SurfaceClothStatistical, EstimatorsAgreeWithEachOtherAndWithTheLightsIntegr
 }
 
 TEST(SurfaceCloth, EscapesAloneNeverMeetADirectionalLight) {
-  const World world = surface_world(constant_model(), flat_cloth(4, 4), {directional({0, 0, 1})});
+  const SurfaceWorld world =
+      surface_world(constant_model(), flat_cloth(4, 4), {directional({0, 0, 1})});
   RandomStream random(1, RandomStage::kTest, 0, 0);
   EXPECT_TRUE(
       (world.tracer(LightEstimator::kEscapes).trace(ray_to({0, 0, 0}, {0, 0, 1}), random).single ==
@@ -279,7 +270,7 @@ TEST(SurfaceCloth, NoBlackRimWhereNormalsTurnAwayFromTheEye) {
                      2 * std::cos(radians(11.25)) * std::cos(last) - 2);
   const Vec3 from(0, -static_cast<float>(std::cos(radians(38))),
                   static_cast<float>(std::sin(radians(38))));
-  const World world = surface_world(constant_model(), arch(4), {directional(from)});
+  const SurfaceWorld world = surface_world(constant_model(), arch(4), {directional(from)});
   int bent = 0;
   for (int k = -9; k < 10; ++k) {
     const EyeRay eye = ray_to(middle + 0.04 * k * Vec3d(0, std::cos(last), -std::sin(last)), from);
@@ -298,7 +289,7 @@ TEST(SurfaceCloth, NoBlackRimWhereNormalsTurnAwayFromTheEye) {
 }
 
 TEST(SurfaceCloth, TheBackShowsTheModelUnderLightFromBelow) {
-  const World world =
+  const SurfaceWorld world =
       surface_world(constant_model(), flat_cloth(4, 4),
                     {directional({0, 0.2F, 1}), directional({0.1F, 0, -1}, Rgb(7, 7, 7))});
   RandomStream random(1, RandomStage::kTest, 0, 0);
@@ -316,9 +307,9 @@ TEST(SurfaceCloth, ThePixelsFootprintAndPlaceReachTheModel) {
     return Rgbd(static_cast<double>(point.footprint_mm), static_cast<double>(point.position_mm.x()),
                 static_cast<double>(point.position_mm.y()));
   });
-  const World world =
+  const SurfaceWorld world =
       surface_world(report, flat_cloth(40, 40), {directional({0, 0, 1}, Rgb(1, 1, 1))});
-  const Camera camera = camera_from({0, 0, 60}, 6, 12);  // 0.5 mm per pixel, 60 mm away
+  const Camera camera = test::camera_from({0, 0, 60}, 6, 12);  // 0.5 mm per pixel, 60 mm away
   RandomStream random(1, RandomStage::kTest, 0, 0);
   for (const double x : {1.3, 9.5}) {
     const Rgb seen_there = world.tracer().trace(camera.ray(x, 4), random).single;
@@ -330,9 +321,9 @@ TEST(SurfaceCloth, ThePixelsFootprintAndPlaceReachTheModel) {
 
 TEST(SurfaceCloth, LayersOfAPicture) {
   const Light light = directional({0.2F, 0, 1});
-  const World world = surface_world(constant_model(), flat_cloth(4, 4), {light});
-  const FrameBuffers frame = shade_picture(world.renderer(), camera_from({0, 0, 60}, 8, 16),
-                                           {0, 0, 16, 16}, 2, kNoProgress);
+  const SurfaceWorld world = surface_world(constant_model(), flat_cloth(4, 4), {light});
+  const FrameBuffers frame = shade_picture(world.renderer(), test::camera_from({0, 0, 60}, 8, 16),
+                                           {0, 0, 16, 16}, 2, test::no_progress);
   int covered = 0;
   for (std::size_t k = 0; k < frame.pixel_count(); ++k) {
     EXPECT_EQ(frame.segment[k], 0xffffffffU);
@@ -353,13 +344,14 @@ TEST(SurfaceCloth, MeshesAndSurfacesShadowASurface) {
   TriangleMesh roof{{Vec3(0, -5, 1), Vec3(5, -5, 1), Vec3(5, 5, 1), Vec3(0, 5, 1)},
                     {{0, 1, 2}, {0, 2, 3}}};
   const Light light = directional({0, 0, 1});
-  const World mesh =
+  const SurfaceWorld mesh =
       make_world({}, {roof}, {SurfaceCloth(constant_model(), flat_cloth(4, 4))}, {light});
-  const World surface = make_world({}, {},
-                                   {SurfaceCloth(constant_model(), lifted(flat_cloth(1, 1), 1)),
-                                    SurfaceCloth(constant_model(), flat_cloth(4, 4))},
-                                   {light});
-  const auto lit = [](const World& world, double x) {
+  const SurfaceWorld surface =
+      make_world({}, {},
+                 {SurfaceCloth(constant_model(), lifted(flat_cloth(1, 1), 1)),
+                  SurfaceCloth(constant_model(), flat_cloth(4, 4))},
+                 {light});
+  const auto lit = [](const SurfaceWorld& world, double x) {
     RandomStream random(1, RandomStage::kTest, 0, 0);
     return world.tracer().trace(ray_to({x, 0, 0}, {-1, 0, 0.3F}), random).single[0];
   };
@@ -373,7 +365,7 @@ TEST(SurfaceCloth, ARoofTakesAllOfAGaussianLight) {
   const TriangleMesh roof{{Vec3(-9e3F, -9e3F, 1), Vec3(9e3F, -9e3F, 1), Vec3(0, 9e3F, 1)},
                           {{0, 1, 2}}};
   for (const bool covered : {false, true}) {
-    const World world =
+    const SurfaceWorld world =
         make_world({}, covered ? std::vector{roof} : std::vector<TriangleMesh>{},
                    {SurfaceCloth(constant_model(), flat_cloth(4, 4))}, {gaussian({0, 0, 1}, 8)});
     for (const LightEstimator estimator :
@@ -392,9 +384,9 @@ TEST(SurfaceCloth, FibersShadowASurface) {
   // Fibers of radius 0.05 over x = -0.5 and 0.5. Traced fibers shade what lies under them; as a
   // solid the shell shades all.
   const auto sparse = std::make_shared<TileScene>(single_fiber(test_cotton()));
-  const World world = make_world({{sparse, lifted(flat_cloth(2, 2), 1)}}, {},
-                                 {SurfaceCloth(constant_model(), flat_cloth(8, 8))},
-                                 {directional({0, 0, 1}, Rgb(1, 1, 1))});
+  const SurfaceWorld world = make_world({{sparse, lifted(flat_cloth(2, 2), 1)}}, {},
+                                        {SurfaceCloth(constant_model(), flat_cloth(8, 8))},
+                                        {directional({0, 0, 1}, Rgb(1, 1, 1))});
   const PathTracer tracer = world.tracer();
   for (int k = -35; k < 36; ++k) {
     RandomStream random(1, RandomStage::kTest, 0, 0);
@@ -413,8 +405,9 @@ TEST(SurfaceCloth, ASurfaceShadowsFibersAndTheNearerHidesTheOther) {
   // The surface hangs over x > 0 of the fibers.
   ClothMesh half = lifted(flat_cloth(4, 4), 1);
   for (Vec3d& position : half.positions) position.x() += 2;
-  const World world = make_world({{tile, flat_cloth(6, 4)}}, {},
-                                 {SurfaceCloth(constant_model(), half)}, {directional({0, 0, 1})});
+  const SurfaceWorld world =
+      make_world({{tile, flat_cloth(6, 4)}}, {}, {SurfaceCloth(constant_model(), half)},
+                 {directional({0, 0, 1})});
   const PathTracer tracer = world.tracer();
   const auto mean = [&](double x, const Vec3& from) {
     RunningMean total;
@@ -434,13 +427,13 @@ TEST(SurfaceCloth, ASurfaceShadowsFibersAndTheNearerHidesTheOther) {
 }
 
 TEST(SurfaceClothEndToEnd, SameBytesForAnyThreadsAndCrop) {
-  const World world = surface_world(preset("silk-shot"), arch(12),
-                                    {directional({0.3F, 0.2F, 1}), gaussian({-0.5F, 0, 1}, 150)});
-  const Camera camera = camera_from({0, 2, 6}, 5, 32);
+  const SurfaceWorld world = surface_world(
+      preset("silk-shot"), arch(12), {directional({0.3F, 0.2F, 1}), gaussian({-0.5F, 0, 1}, 150)});
+  const Camera camera = test::camera_from({0, 2, 6}, 5, 32);
   const auto pictures = [&](std::size_t threads, const PixelRect& crop) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-    return std::pair{shade_picture(world.renderer(), camera, crop, 3, kNoProgress),
-                     trace_picture(world.tracer(), camera, crop, 1, {2, {}}, kNoProgress)};
+    return std::pair{shade_picture(world.renderer(), camera, crop, 3, test::no_progress),
+                     trace_picture(world.tracer(), camera, crop, 1, {2, {}}, test::no_progress)};
   };
   const auto one = pictures(1, {0, 0, 32, 32});
   const auto two = pictures(2, {0, 0, 32, 32});

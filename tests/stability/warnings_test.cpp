@@ -135,12 +135,11 @@ class Pictures {
     SmallScene small = scene;
     small.pixels = 16;
     const PictureResult result = pipeline_.picture(small, method, spp, true, variant);
-    const std::vector<Warning> warnings = warnings_of(result.report.at("warnings"));
-    for (const Warning& warning : warnings) {
+    for (const Warning& warning : result.warnings) {
       EXPECT_NE(pipeline_.messages().find(warning_text(warning)), std::string::npos)
           << "said as well as reported";
     }
-    Subjects subjects = subjects_of(warnings);
+    Subjects subjects = subjects_of(result.warnings);
     // of the few harmonics of this fabric; it has a test of its own
     std::erase(subjects, "ringing");
     return subjects;

@@ -35,12 +35,6 @@ inline FabricConfig small_fabric(const std::string& notation = "plain") {
   return config;
 }
 
-inline FiberScattering white_fiber() {
-  FiberScattering fiber;
-  fiber.isotropic_white = true;
-  return fiber;
-}
-
 /// Straight periodic fibers along x at the given (y, z), `segments` pieces each, on a width x
 /// height tile.
 inline Exemplar straight_fibers(float width, float height, const std::vector<Vec2>& places,

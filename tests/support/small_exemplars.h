@@ -5,24 +5,13 @@
 #include <cstdint>
 
 #include "fibers/cloth/exemplar.h"
+#include "tests/support/fibers.h"
 
 namespace heddle {
 
 /// Cotton of the fabric configs, with a wider R lobe so that few samples suffice.
 inline FiberScattering test_cotton() {
-  FiberScattering fiber;
-  fiber.color_r = {0.5, 0.4, 0.3};
-  fiber.color_tt = {0.9, 0.8, 0.6};
-  fiber.beta_r = radians(8);
-  fiber.beta_tt = radians(27);
-  fiber.gamma_tt = radians(38);
-  return fiber;
-}
-
-inline FiberScattering white_isotropic() {
-  FiberScattering fiber;
-  fiber.isotropic_white = true;
-  return fiber;
+  return test::fiber_in_degrees({.5, .4, .3}, {.9, .8, .6}, 8, 27, 38);
 }
 
 /// Appends a straight fiber through (x, y, z) along the weft (x) or the warp (y), cut into

@@ -10,6 +10,7 @@
 #include "fibers/tracing/tile_scene.h"
 #include "formats/input_error.h"
 #include "tests/support/fabrics.h"
+#include "tests/support/fibers.h"
 #include "tests/support/mutations.h"
 #include "tests/support/small_exemplars.h"
 #include "tests/support/temporary_folder.h"

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "tests/support/fabrics.h"
+#include "tests/support/fibers.h"
 
 namespace heddle {
 namespace {

@@ -9,6 +9,7 @@
 #include "fibers/math/spherical_harmonics.h"
 #include "fibers/scattering/sg_scatter.h"
 #include "tests/fibers/scattering/fibers_for_tests.h"
+#include "tests/support/fibers.h"
 #include "tests/support/statistics.h"
 
 namespace heddle {
@@ -60,13 +61,13 @@ TEST(BcsdfTableStatistical, SamplesFollowTheDensity) {
   const Rgbd color_r(.3, .2, .1);
   const Rgbd color_tt(.9, .5, .1);
   const Case cases[] = {
-      {"beta .1 / .1, gamma 20", fiber_in_degrees(color_r, color_tt, .1, .1, 20), .5},
+      {"beta .1 / .1, gamma 20", test::fiber_in_degrees(color_r, color_tt, .1, .1, 20), .5},
       {"silk", fibers_for_tests()[2].scattering, 5.0},
       {"cotton", fibers_for_tests()[3].scattering, 5.0},
-      {"beta 10 / 10, gamma 10", fiber_in_degrees(color_r, color_tt, 10, 10, 10), 0.0},
-      {"beta 27 / 27, gamma 38", fiber_in_degrees(color_r, color_tt, 27, 27, 38), 0.0},
-      {"beta 60 / 60, gamma 60", fiber_in_degrees(color_r, color_tt, 60, 60, 60), 0.0},
-      {"white", white_isotropic_fiber(), 0.0},
+      {"beta 10 / 10, gamma 10", test::fiber_in_degrees(color_r, color_tt, 10, 10, 10), 0.0},
+      {"beta 27 / 27, gamma 38", test::fiber_in_degrees(color_r, color_tt, 27, 27, 38), 0.0},
+      {"beta 60 / 60, gamma 60", test::fiber_in_degrees(color_r, color_tt, 60, 60, 60), 0.0},
+      {"white", test::white_fiber(), 0.0},
   };
   constexpr int kTests = static_cast<int>(std::size(cases) * std::size(kViewsDeg));
   RandomStream random(2, RandomStage::kTest, 0, 0);
@@ -90,7 +91,7 @@ TEST(BcsdfTableStatistical, SamplesFollowTheDensity) {
 }
 
 TEST(BcsdfTableStatistical, ADensityWrongByTwoPercentIsRejected) {
-  const BcsdfTable table(fiber_in_degrees({.3, .2, .1}, {.9, .5, .1}, 10, 10, 10));
+  const BcsdfTable table(test::fiber_in_degrees({.3, .2, .1}, {.9, .5, .1}, 10, 10, 10));
   RandomStream random(3, RandomStage::kTest, 0, 0);
   const Vec3 wo = view(60.0, 0.0);
   const auto sample = [&] { return Vec3d(table.sample(wo, random).wi.cast<double>()); };
@@ -165,7 +166,7 @@ TEST(BcsdfTableStatistical, MeanWeightIsTheAdjointAlbedoAndTheWorstIsSmall) {
 }
 
 TEST(BcsdfTable, WhiteIsotropicFiberIsSampledWithWeightOne) {
-  const BcsdfTable table(white_isotropic_fiber());
+  const BcsdfTable table(test::white_fiber());
   RandomStream random(5, RandomStage::kTest, 0, 0);
   for (int k = 0; k < 1000; ++k) {
     const Vec3 wo = sample_sphere(random);
@@ -226,7 +227,7 @@ TEST(BcsdfTableAgreement, HarmonicsAgainstTheDefinition) {
 TEST(BcsdfTableAgreement, LightFromSphericalGaussiansAgainstDouble) {
   RandomStream random(7, RandomStage::kTest, 0, 0);
   std::vector<NamedFiber> fibers = fibers_for_tests();
-  fibers.push_back({"white", white_isotropic_fiber()});
+  fibers.push_back({"white", test::white_fiber()});
   double worst = 0.0;
   for (const NamedFiber& named : fibers) {
     const BcsdfTable table(named.scattering);
@@ -318,7 +319,7 @@ TEST(BcsdfTableAgreement, LobesOfGammaComeFromWhereQuadratureSays) {
 TEST(BcsdfTableAgreement, LightBlurredInInclinationAgainstQuadrature) {
   RandomStream random(9, RandomStage::kTest, 0, 0);
   std::vector<NamedFiber> fibers = fibers_for_tests();
-  fibers.push_back({"white", white_isotropic_fiber()});
+  fibers.push_back({"white", test::white_fiber()});
   double worst = 0;
   for (const NamedFiber& named : fibers) {
     // Lobes as broad as the range of inclinations are not what this is for; a black fiber's F is

@@ -12,6 +12,7 @@
 #include "fibers/math/spherical_gaussian.h"
 #include "fibers/scattering/bcsdf_table.h"
 #include "tests/fibers/scattering/fibers_for_tests.h"
+#include "tests/support/fibers.h"
 
 namespace heddle {
 namespace {
@@ -22,8 +23,8 @@ std::vector<FiberScattering> extreme_fibers() {
     for (const double gamma : {0.1, 60.0}) {
       for (const double color_r : {0.0, 1.0}) {
         for (const double color_tt : {0.0, 1.0}) {
-          fibers.push_back(fiber_in_degrees(Rgbd::Constant(color_r), Rgbd::Constant(color_tt), beta,
-                                            beta, gamma));
+          fibers.push_back(test::fiber_in_degrees(Rgbd::Constant(color_r), Rgbd::Constant(color_tt),
+                                                  beta, beta, gamma));
         }
       }
     }

@@ -7,6 +7,7 @@
 #include "fibers/math/quadrature.h"
 #include "fibers/math/spherical_harmonics.h"
 #include "tests/fibers/scattering/fibers_for_tests.h"
+#include "tests/support/fibers.h"
 
 namespace heddle {
 namespace {
@@ -44,7 +45,7 @@ TEST(FiberBcsdfLaw, EnergyIsSchlickPlusTransmission) {
           << named.name << " at " << theta_deg;
     }
   }
-  EXPECT_NEAR(bcsdf_albedo(white_isotropic_fiber(), 0.4)[1], 1.0, 1e-13);
+  EXPECT_NEAR(bcsdf_albedo(test::white_fiber(), 0.4)[1], 1.0, 1e-13);
 }
 
 TEST(FiberBcsdfLaw, EnergyOfTheEvaluatedFunction) {
@@ -99,7 +100,7 @@ TEST(FiberBcsdfLaw, OnlyTheWhiteIsotropicFiberIsReciprocal) {
   const Vec3d b = vector_from({-1.3, 2.0});
   const FiberScattering wide = fibers_for_tests()[5].scattering;
   EXPECT_GT((evaluate_bcsdf(wide, a, b) / evaluate_bcsdf(wide, b, a) - 1.0).abs().minCoeff(), 0.01);
-  const FiberScattering white = white_isotropic_fiber();
+  const FiberScattering white = test::white_fiber();
   EXPECT_EQ(evaluate_bcsdf(white, a, b)[0], evaluate_bcsdf(white, b, a)[0]);
 }
 
@@ -145,7 +146,7 @@ TEST(FiberBcsdfLaw, HarmonicsOddInZVanish) {
 
 TEST(FiberBcsdfLaw, WhiteIsotropicFiberScattersTheWholeFurnaceToOne) {
   for (const double theta_deg : {0.0, 45.0, 90.0}) {
-    const std::vector<Rgbd> row = bcsdf_sh(white_isotropic_fiber(), radians(theta_deg), 4);
+    const std::vector<Rgbd> row = bcsdf_sh(test::white_fiber(), radians(theta_deg), 4);
     EXPECT_NEAR(row[0][0] * std::sqrt(4.0 * kPi), 1.0, 1e-13);
     EXPECT_NEAR(row[3][0], 0.0, 1e-14);  // cos(theta) is even in x
   }

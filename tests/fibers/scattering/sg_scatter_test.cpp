@@ -8,6 +8,7 @@
 #include "fibers/math/random.h"
 #include "fibers/math/sampling.h"
 #include "tests/fibers/scattering/fibers_for_tests.h"
+#include "tests/support/fibers.h"
 
 namespace heddle {
 namespace {
@@ -96,9 +97,9 @@ TEST(SgScatterAgreement, WhiteIsotropicFiber) {
                    return sg_value(light, vector_from({theta, phi}));
                  });
         });
-    EXPECT_NEAR(sg_scatter(white_isotropic_fiber(), light, wo, SgMethod::kQuadrature)[0] / exact,
-                1.0, 1e-10);
-    EXPECT_NEAR(sg_scatter(white_isotropic_fiber(), light, wo, SgMethod::kDefault)[0] / exact, 1.0,
+    EXPECT_NEAR(sg_scatter(test::white_fiber(), light, wo, SgMethod::kQuadrature)[0] / exact, 1.0,
+                1e-10);
+    EXPECT_NEAR(sg_scatter(test::white_fiber(), light, wo, SgMethod::kDefault)[0] / exact, 1.0,
                 2e-3);
   }
 }
@@ -112,7 +113,7 @@ struct ErrorRow {
 ErrorRow error_row(bool is_tt, double beta_deg, double gamma_deg, double low_deg, double high_deg) {
   const double sharpnesses[] = {25.0, 100.0, 400.0};
   const FiberScattering fiber =
-      fiber_in_degrees({.3, .3, .3}, {.7, .7, .7}, beta_deg, beta_deg, gamma_deg);
+      test::fiber_in_degrees({.3, .3, .3}, {.7, .7, .7}, beta_deg, beta_deg, gamma_deg);
   const Lobe lobe = is_tt ? Lobe::kTt : Lobe::kR;
   ErrorRow row{};
   for (int s = 0; s < 3; ++s) {

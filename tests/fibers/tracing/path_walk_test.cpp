@@ -9,6 +9,7 @@
 #include "fibers/math/quadrature.h"
 #include "fibers/tracing/tile_trace.h"
 #include "tests/support/fabrics.h"
+#include "tests/support/fibers.h"
 
 namespace heddle {
 namespace {
@@ -31,13 +32,7 @@ Estimate estimate(int samples, const std::function<double(int)>& sample) {
 }
 
 FiberScattering dyed_fiber() {
-  FiberScattering fiber;
-  fiber.color_r = Rgbd(0.3, 0.2, 0.1);
-  fiber.color_tt = Rgbd(0.9, 0.6, 0.4);
-  fiber.beta_r = radians(6);
-  fiber.beta_tt = radians(12);
-  fiber.gamma_tt = radians(25);
-  return fiber;
+  return test::fiber_in_degrees({.3, .2, .1}, {.9, .6, .4}, 6, 12, 25);
 }
 
 // Furnace: light 1 from everywhere, a white fiber: a path that follows the BCSDF carries exactly 1,

@@ -6,6 +6,7 @@
 
 #include "fibers/cloth/synthesize.h"
 #include "tests/support/fabrics.h"
+#include "tests/support/fibers.h"
 
 namespace heddle {
 namespace {

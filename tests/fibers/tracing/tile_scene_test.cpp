@@ -8,6 +8,7 @@
 #include "fibers/math/random.h"
 #include "fibers/math/sampling.h"
 #include "tests/support/fabrics.h"
+#include "tests/support/fibers.h"
 
 namespace heddle {
 namespace {

@@ -8,20 +8,11 @@
 #include "fibers/math/sampling.h"
 #include "fibers/math/spherical_gaussian.h"
 #include "fibers/scattering/sg_scatter.h"
+#include "tests/support/fibers.h"
 #include "tests/support/small_exemplars.h"
 
 namespace heddle {
 namespace {
-
-FiberScattering silk() {
-  FiberScattering fiber;
-  fiber.color_r = Rgbd(0.745, 0.008, 0.070);
-  fiber.color_tt = Rgbd(0.620, 0.553, 0.562);
-  fiber.beta_r = radians(1.0);
-  fiber.beta_tt = radians(10.0);
-  fiber.gamma_tt = radians(19.823);
-  return fiber;
-}
 
 Vec3 direction(double theta, double phi) {
   return vector_from({theta, phi}).cast<float>();
@@ -33,7 +24,7 @@ double lattice_theta(const BcsdfFactors& factors, int i) {
 }
 
 TEST(BcsdfFactorsAgreement, AllTermsAreTheBcsdfOnTheLattice) {
-  for (const FiberScattering& fiber : {silk(), test_cotton(), white_isotropic()}) {
+  for (const FiberScattering& fiber : {test::silk_fiber(), test_cotton(), test::white_fiber()}) {
     const BcsdfFactors factors(fiber, BcsdfFactors::kAllTerms);
     RandomStream random(1, RandomStage::kTest, 0, 0);
     for (int k = 0; k < 200; ++k) {
@@ -53,7 +44,7 @@ TEST(BcsdfFactorsAgreement, AllTermsAreTheBcsdfOnTheLattice) {
 }
 
 TEST(BcsdfFactorsAgreement, ResponseToGaussiansIsGamma) {
-  for (const FiberScattering& fiber : {silk(), test_cotton()}) {
+  for (const FiberScattering& fiber : {test::silk_fiber(), test_cotton()}) {
     const BcsdfFactors factors(fiber, BcsdfFactors::kAllTerms);
     RandomStream random(2, RandomStage::kTest, 0, 0);
     for (const double sharpness : {0.0, 5.0, 50.0, 500.0}) {
@@ -111,7 +102,7 @@ TEST(BcsdfFactorsLaw, WhatIsCutOffIsWhatTheSingularValuesSay) {
 }
 
 TEST(BcsdfFactors, IsotropicFiberHasOneTerm) {
-  const BcsdfFactors factors(white_isotropic(), 1);
+  const BcsdfFactors factors(test::white_fiber(), 1);
   EXPECT_NEAR(factors.energy()[0], 1, 1e-5);
   EXPECT_NEAR(factors.value(direction(0.3, 1), direction(-0.8, 2)).x(), std::cos(0.3) / (kPi * kPi),
               1e-4);
@@ -121,9 +112,9 @@ TEST(BcsdfFactorsStability, SixteenTermsOfASpecularFiber) {
   // The R lobe of 1 degree needs hundreds of terms. By solid angles, sixteen keep a blurred picture
   // of it, a small part of its height; of the plain matrix they keep grazing directions and nothing
   // else.
-  const BcsdfFactors full(silk(), BcsdfFactors::kAllTerms);
-  const BcsdfFactors weighted(silk(), 16);
-  const BcsdfFactors plain(silk(), 16, BcsdfFactors::Matrix::kPlain);
+  const BcsdfFactors full(test::silk_fiber(), BcsdfFactors::kAllTerms);
+  const BcsdfFactors weighted(test::silk_fiber(), 16);
+  const BcsdfFactors plain(test::silk_fiber(), 16, BcsdfFactors::Matrix::kPlain);
   const Vec3 wi = direction(0.4, 0);
   const Vec3 wo = direction(-0.4, 0.5);
   const float peak = full.value(wi, wo).x();

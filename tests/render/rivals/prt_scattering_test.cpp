@@ -10,6 +10,7 @@
 #include "fibers/math/spherical_harmonics.h"
 #include "fibers/scattering/sg_scatter.h"
 #include "tests/render/rivals/visibility_for_tests.h"
+#include "tests/support/fibers.h"
 #include "tests/support/small_exemplars.h"
 
 namespace heddle {
@@ -73,14 +74,8 @@ TEST(PrtScatteringStability, LosesHighlightsAndRings) {
   // A silk fiber along x in open sky, light at 30 degrees from the normal plane. Order 5 turns the
   // highlight of 1 degree into a bump of about 30 degrees: less than a tenth of its height is left,
   // and there is light of the wrong sign.
-  FiberScattering silk;
-  silk.color_r = Rgbd(0.745, 0.008, 0.070);
-  silk.color_tt = Rgbd(0.620, 0.553, 0.562);
-  silk.beta_r = radians(1.0);
-  silk.beta_tt = radians(10.0);
-  silk.gamma_tt = radians(19.823);
   const SsdfVisibility ssdf = uniform_visibility({all_open});
-  const std::vector<BcsdfTable> materials = {BcsdfTable(silk)};
+  const std::vector<BcsdfTable> materials = {BcsdfTable(test::silk_fiber())};
   const PrtScattering prt(ssdf, true, materials);
   const auto view = [](double degrees) {
     return Vec3d(std::sin(radians(degrees)), 0, std::cos(radians(degrees))).cast<float>().eval();

@@ -8,6 +8,7 @@
 #include "fibers/math/sampling.h"
 #include "fibers/math/spherical_gaussian.h"
 #include "tests/render/rivals/visibility_for_tests.h"
+#include "tests/support/fibers.h"
 #include "tests/support/small_exemplars.h"
 #include "tests/support/statistics.h"
 
@@ -16,7 +17,7 @@ namespace {
 
 TEST(TsaiShihScattering, VisibilityIsTheMapSeenThroughGaussians) {
   const SsdfVisibility ssdf = uniform_visibility({upper_half_space, all_open});
-  const std::vector<BcsdfTable> materials = {BcsdfTable(white_isotropic())};
+  const std::vector<BcsdfTable> materials = {BcsdfTable(test::white_fiber())};
   const TsaiShihScattering scattering(ssdf, true, materials, 1);
   RandomStream random(1, RandomStage::kTest, 0, 0);
   RunningMean open;
@@ -43,7 +44,7 @@ TEST(TsaiShihScattering, VisibilityIsTheMapSeenThroughGaussians) {
 TEST(TsaiShihScatteringLaw, WhiteFurnaceUnderOpenSky) {
   // The white isotropic fiber in constant light 1 / 4 pi shows 1 / 4 pi.
   const SsdfVisibility ssdf = uniform_visibility({all_open});
-  const std::vector<BcsdfTable> materials = {BcsdfTable(white_isotropic())};
+  const std::vector<BcsdfTable> materials = {BcsdfTable(test::white_fiber())};
   const TsaiShihScattering scattering(ssdf, true, materials, BcsdfFactors::kAllTerms);
   const ShadingPoint point = {0, 0, 0, {{1, 0, 0}, {1, 0, 0}}, {{0, 0.6F, 0.8F}, {0, 0.6F, 0.8F}}};
   const Rgb value = scattering.spherical_gaussian(point, {{0, 0, 1}, {0, 0, 1}}, 0);

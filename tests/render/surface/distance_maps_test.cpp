@@ -9,13 +9,10 @@
 #include "fibers/math/sampling.h"
 #include "formats/tensor_file.h"
 #include "tests/formats/file_fixture.h"
+#include "tests/support/directions.h"
 
 namespace heddle {
 namespace {
-
-Vec3d upper_direction(RandomStream& random) {
-  return sample_hemisphere(Vec3(0, 0, 1), random).cast<double>().normalized();
-}
 
 // Hidden beyond a plane through the point: w.m > 0.
 DistanceMaps wall_map(const Vec3& m, const Mat3& frame, int resolution = 64) {
@@ -30,7 +27,7 @@ TEST(DistanceMaps, HorizonOfAnOpenSurface) {
   const DistanceMaps maps = wall_map(Vec3(0, 0, -1), Mat3::Identity());
   RandomStream random(1, RandomStage::kTest, 0, 0);
   for (int k = 0; k < 500; ++k) {
-    const Vec3d w = upper_direction(random);
+    const Vec3d w = test::upper_direction(random);
     const SignedDistance at = maps.evaluate(maps.coefficients(0), w);
     const double elevation = std::asin(w.z());
     // The map's horizon is a line between cells here, so the distances are exact but for
@@ -50,7 +47,7 @@ TEST(DistanceMapsLaw, DistanceToAWallIsGeodesic) {
   const DistanceMaps maps = wall_map(m, Mat3::Identity(), 128);
   RandomStream random(2, RandomStage::kTest, 0, 0);
   for (int k = 0; k < 500; ++k) {
-    const Vec3d w = upper_direction(random);
+    const Vec3d w = test::upper_direction(random);
     const double to_wall = std::asin(-w.dot(m.cast<double>()));
     const double to_horizon = std::asin(w.z());
     if (std::abs(w.x()) > 0.95) continue;
@@ -73,7 +70,7 @@ TEST(DistanceMapsLaw, OnlyTheFrameCounts) {
   RandomStream random(3, RandomStage::kTest, 0, 0);
   int different = 0;
   for (int k = 0; k < 200; ++k) {
-    const Vec3d w = upper_direction(random);
+    const Vec3d w = test::upper_direction(random);
     different += std::abs(here.evaluate(here.coefficients(0), w).distance -
                           there.evaluate(there.coefficients(0), w).distance) > 1e-4;
   }
@@ -197,7 +194,7 @@ TEST_F(DistanceMapsFormat, ReadsWhatItWrote) {
   EXPECT_EQ(read.compression_error(), maps.compression_error());
   RandomStream random(9, RandomStage::kTest, 0, 0);
   for (int k = 0; k < 100; ++k) {
-    const Vec3d w = upper_direction(random);
+    const Vec3d w = test::upper_direction(random);
     EXPECT_EQ(read.evaluate(read.coefficients(0), w).distance,
               maps.evaluate(maps.coefficients(0), w).distance);
   }

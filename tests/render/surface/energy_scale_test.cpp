@@ -21,7 +21,7 @@
 namespace heddle {
 namespace {
 
-const SurfacePoint kFar = {Vec2(0.1F, 0.2F), 1000};
+const SurfacePoint kFromAfar = {Vec2(0.1F, 0.2F), 1000};
 
 std::unique_ptr<const SurfaceModel> cotton(const char* preset, bool energy_safe, double diffuse,
                                            double specular) {
@@ -81,7 +81,7 @@ double albedo(const SurfaceModel& model, const Vec3& wo, int samples, double& st
   RunningMean channels[3];
   for (int n = 0; n < samples; ++n) {
     RandomStream random(2, RandomStage::kTest, static_cast<std::uint64_t>(n), 0);
-    const auto sample = model.sample(kFar, wo, random);
+    const auto sample = model.sample(kFromAfar, wo, random);
     for (int c = 0; c < 3; ++c)
       channels[c].add(sample ? static_cast<double>(sample->weight[c]) : 0);
   }
@@ -136,7 +136,8 @@ TEST(EnergyScaleLaw, NothingChangesWhereEnergyHolds) {
       RandomStream random(4, RandomStage::kTest, static_cast<std::uint64_t>(k), 0);
       const Vec3d wi = direction_of(k, random).cast<double>().normalized();
       const Vec3d wo = direction_of(k + 1, random).cast<double>().normalized();
-      EXPECT_TRUE((safe->reflected(kFar, wi, wo) == published->reflected(kFar, wi, wo)).all())
+      EXPECT_TRUE(
+          (safe->reflected(kFromAfar, wi, wo) == published->reflected(kFromAfar, wi, wo)).all())
           << fabric.preset;
     }
   }

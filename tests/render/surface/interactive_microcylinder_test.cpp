@@ -7,17 +7,11 @@
 
 #include "fibers/math/random.h"
 #include "fibers/math/sampling.h"
+#include "tests/support/directions.h"
+#include "tests/support/pictures.h"
 
 namespace heddle {
 namespace {
-
-Vec3d upper_direction(RandomStream& random) {
-  return sample_hemisphere(Vec3(0, 0, 1), random).cast<double>().normalized();
-}
-
-Light sg_light(const Vec3& axis, float sharpness, const Rgb& irradiance = Rgb(1, 1, 1)) {
-  return {LightType::kSphericalGaussian, axis.normalized(), sharpness, irradiance};
-}
 
 // Linen and crepe de Chine of Sadeghi et al. 2013, the latter without its slope.
 MicrocylinderFabric linen() {
@@ -80,11 +74,11 @@ TEST(InteractiveMicrocylinderAgreement, EightAtATimeAreNearTheDoubles) {
     const InteractiveMicrocylinder model(fabric, small_tables());
     for (int k = 0; k < 1500; ++k) {
       RandomStream random(6, RandomStage::kTest, static_cast<std::uint64_t>(k), 0);
-      const Vec3d wo = upper_direction(random);
+      const Vec3d wo = test::upper_direction(random);
       std::vector<Light> lights;
       for (int n = 0; n < 1 + k % 12; ++n) {
         const float sharpness = n == 5 ? 0 : std::pow(10.0F, 5 * random.uniform() - 1);
-        lights.push_back(sg_light(sample_sphere(random), sharpness, Rgb(1, 2, 0.5F)));
+        lights.push_back(test::sg_light(sample_sphere(random), sharpness, Rgb(1, 2, 0.5F)));
       }
       const PointVisibility visibility =
           k % 2 == 0 ? PointVisibility{} : PointVisibility{&maps, maps.coefficients(0)};
@@ -110,8 +104,8 @@ TEST(InteractiveMicrocylinderAgreement, ReflectedIsSadeghisModelWhereCurvesAreFl
   const Microcylinder model(flat_silk());
   RandomStream random(1, RandomStage::kTest, 0, 0);
   for (int k = 0; k < 500; ++k) {
-    const Vec3d wi = upper_direction(random);
-    const Vec3d wo = upper_direction(random);
+    const Vec3d wi = test::upper_direction(random);
+    const Vec3d wo = test::upper_direction(random);
     const Rgbd expected = model.published(wi, wo);
     EXPECT_LT((interactive.reflected(wi, wo) - expected).abs().maxCoeff(),
               1e-9 * expected.maxCoeff() + 1e-12);
@@ -124,8 +118,8 @@ double rms_error(const InteractiveMicrocylinder& model, float sharpness, int cou
   double error = 0;
   double norm = 0;
   for (int k = 0; k < count; ++k) {
-    const Vec3d wo = upper_direction(random);
-    const Light light = sg_light(sample_hemisphere(Vec3(0, 0, 1), random), sharpness);
+    const Vec3d wo = test::upper_direction(random);
+    const Light light = test::sg_light(sample_hemisphere(Vec3(0, 0, 1), random), sharpness);
     if (wo.z() < 0.1) continue;
     PointVisibility visibility;
     if (maps != nullptr) visibility = {maps, maps->coefficients(0)};
@@ -177,11 +171,11 @@ TEST(InteractiveMicrocylinderLaw, EditingIsTheSameAsBuildingAnew) {
   fabric.threads[0].scattering = {1.6, Rgbd(0.5, 0.1, 0.2), 0.6, radians(14), radians(30)};
   edited.set_scattering(0, fabric.threads[0].scattering);
   const InteractiveMicrocylinder fresh(fabric, small_tables());
-  const std::vector<Light> lights = {sg_light({0.3F, 0.2F, 1}, 20),
-                                     sg_light({-1, 0.2F, 0.5F}, 200)};
+  const std::vector<Light> lights = {test::sg_light({0.3F, 0.2F, 1}, 20),
+                                     test::sg_light({-1, 0.2F, 0.5F}, 200)};
   RandomStream random(3, RandomStage::kTest, 0, 0);
   for (int k = 0; k < 50; ++k) {
-    const Vec3d wo = upper_direction(random);
+    const Vec3d wo = test::upper_direction(random);
     const Rgbd a = edited.shade(Mat3d::Identity(), wo, lights, {});
     EXPECT_TRUE((a == fresh.shade(Mat3d::Identity(), wo, lights, {})).all());
   }
@@ -190,10 +184,10 @@ TEST(InteractiveMicrocylinderLaw, EditingIsTheSameAsBuildingAnew) {
 TEST(InteractiveMicrocylinderLaw, TurnsWithTheWorldAndIsLinearInLight) {
   const InteractiveMicrocylinder& model = linen_model(false);
   const Mat3d turn = frame_about(Vec3(0.4F, -0.3F, 0.8F).normalized()).cast<double>();
-  std::vector<Light> lights = {sg_light({0.3F, 0.2F, 1}, 20, {1, 2, 3}),
-                               sg_light({-1, 0.2F, 0.5F}, 200)};
+  std::vector<Light> lights = {test::sg_light({0.3F, 0.2F, 1}, 20, {1, 2, 3}),
+                               test::sg_light({-1, 0.2F, 0.5F}, 200)};
   RandomStream random(4, RandomStage::kTest, 0, 0);
-  const Vec3d wo = upper_direction(random);
+  const Vec3d wo = test::upper_direction(random);
   const Rgbd here = model.shade(Mat3d::Identity(), wo, lights, {});
   std::vector<Light> turned = lights;
   for (Light& light : turned) light.axis = turn.cast<float>() * light.axis;
@@ -237,7 +231,7 @@ TEST(InteractiveMicrocylinderStability, FiniteAndNotNegativeAnywhere) {
     const InteractiveMicrocylinder model(velvet, small_tables(printed));
     for (int k = 0; k < 3000; ++k) {
       RandomStream random(5, RandomStage::kTest, static_cast<std::uint64_t>(k), 0);
-      Vec3d wo = upper_direction(random);
+      Vec3d wo = test::upper_direction(random);
       Vec3 axis = sample_sphere(random);
       if (k % 3 == 0) wo.z() *= 1e-6;
       if (k % 5 == 0) axis = Vec3::Unit(k % 3);
@@ -246,7 +240,7 @@ TEST(InteractiveMicrocylinderStability, FiniteAndNotNegativeAnywhere) {
       if (k % 13 == 0) axis = Vec3(0, 0, -1);
       wo.normalize();
       const float sharpness = k % 4 == 0 ? 0 : std::pow(10.0F, 8 * random.uniform() - 2);
-      const Light light = sg_light(axis, sharpness);
+      const Light light = test::sg_light(axis, sharpness);
       const PointVisibility visibility =
           k % 2 == 0 ? PointVisibility{} : PointVisibility{&maps, maps.coefficients(0)};
       const Rgbd value = model.shade(Mat3d::Identity(), wo, {&light, 1}, visibility);
@@ -255,7 +249,7 @@ TEST(InteractiveMicrocylinderStability, FiniteAndNotNegativeAnywhere) {
           << value.transpose();
     }
   }
-  const Light light = sg_light({0, 0, 1}, 10);
+  const Light light = test::sg_light({0, 0, 1}, 10);
   EXPECT_EQ(
       linen_model(false).shade(Mat3d::Identity(), Vec3d(0, 0.6, -0.8), {&light, 1}, {}).maxCoeff(),
       0);
@@ -283,7 +277,7 @@ TEST(InteractiveMicrocylinderStability, WideLightsOnUprightTangentsAreOff) {
 // Gaussian's moment.
 TEST(RayTracedRadianceLaw, IntegratesGaussians) {
   for (const float sharpness : {0.0F, 3.0F, 500.0F}) {
-    const Light light = sg_light({0, 0, 1}, sharpness, {2, 3, 4});
+    const Light light = test::sg_light({0, 0, 1}, sharpness, {2, 3, 4});
     const auto all = [](const Vec3&) { return true; };
     // The share of the light above the horizon, and its cosine there.
     const double s = static_cast<double>(sharpness);

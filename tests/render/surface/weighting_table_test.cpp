@@ -9,13 +9,10 @@
 #include "fibers/math/sampling.h"
 #include "formats/tensor_file.h"
 #include "tests/formats/file_fixture.h"
+#include "tests/support/directions.h"
 
 namespace heddle {
 namespace {
-
-Vec3d upper_direction(RandomStream& random) {
-  return sample_hemisphere(Vec3(0, 0, 1), random).cast<double>().normalized();
-}
 
 MicrocylinderThread thread_of(int direction, double share, std::vector<double> offsets_deg,
                               std::vector<double> lengths) {
@@ -74,8 +71,8 @@ TEST(ThreadWeightsLaw, SharesOfOneAtMost) {
   const std::vector<TangentSample> tangents = tangent_samples(fabric, 16);
   RandomStream random(1, RandomStage::kTest, 0, 0);
   for (int k = 0; k < 500; ++k) {
-    const Vec3d wi = upper_direction(random);
-    const Vec3d wo = upper_direction(random);
+    const Vec3d wi = test::upper_direction(random);
+    const Vec3d wo = test::upper_direction(random);
     double sum = 0;
     for (const double weight : thread_weights(fabric, tangents, Weighting::kConsistent, wi, wo)) {
       EXPECT_GE(weight, 0);
@@ -103,8 +100,8 @@ TEST(ThreadWeightsLaw, PrintedWeightsAreHalf) {
   const std::vector<TangentSample> tangents = tangent_samples(fabric, 16);
   RandomStream random(2, RandomStage::kTest, 0, 0);
   for (int k = 0; k < 200; ++k) {
-    const Vec3d wi = upper_direction(random);
-    const Vec3d wo = upper_direction(random);
+    const Vec3d wi = test::upper_direction(random);
+    const Vec3d wo = test::upper_direction(random);
     const std::vector<double> consistent =
         thread_weights(fabric, tangents, Weighting::kConsistent, wi, wo);
     const std::vector<double> printed =
@@ -162,8 +159,8 @@ TEST(WeightingTableAgreement, TableAgainstDirectAverages) {
   double norm = 0;
   double worst = 0;
   for (int k = 0; k < 40; ++k) {
-    const Vec3d wo = upper_direction(random);
-    Vec3d axis = upper_direction(random);
+    const Vec3d wo = test::upper_direction(random);
+    Vec3d axis = test::upper_direction(random);
     if (k % 8 == 0) axis.z() *= -0.3;
     axis.normalize();
     const double sharpness =
@@ -207,7 +204,7 @@ TEST(WeightingTableAgreement, EightAtATime) {
   const WeightingTable table(fabric, tangent_samples(fabric, 2), Weighting::kConsistent, settings);
   RandomStream random(7, RandomStage::kTest, 0, 0);
   for (int k = 0; k < 500; ++k) {
-    const WeightingTable::Outgoing outgoing = table.outgoing(upper_direction(random));
+    const WeightingTable::Outgoing outgoing = table.outgoing(test::upper_direction(random));
     Vec8 axes;
     Float8 sharpness;
     for (int lane = 0; lane < 8; ++lane) {
@@ -252,8 +249,8 @@ TEST_F(WeightingTableFormat, ReadsWhatItWrote) {
   EXPECT_EQ(read.bytes(), table.bytes());
   RandomStream random(8, RandomStage::kTest, 0, 0);
   for (int k = 0; k < 200; ++k) {
-    const Vec3d wo = upper_direction(random);
-    const Vec3d axis = upper_direction(random);
+    const Vec3d wo = test::upper_direction(random);
+    const Vec3d axis = test::upper_direction(random);
     const std::size_t t = static_cast<std::size_t>(k) % table.ranks().size();
     EXPECT_EQ(read.value(t, read.outgoing(wo), axis, 3.0 * k),
               table.value(t, table.outgoing(wo), axis, 3.0 * k));

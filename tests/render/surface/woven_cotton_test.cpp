@@ -11,6 +11,7 @@
 #include "fibers/math/spherical_gaussian.h"
 #include "formats/input_error.h"
 #include "render/surface/surface_presets.h"
+#include "tests/support/directions.h"
 #include "tests/support/statistics.h"
 
 namespace heddle {
@@ -33,13 +34,6 @@ WovenCotton model_of(const std::string& text) {
   return WovenCotton(read_woven_cotton(document));
 }
 
-Vec3d random_direction(RandomStream& random, double min_z = 0.0) {
-  const double z = min_z + (1.0 - min_z) * random.uniform_double();
-  const double phi = 2.0 * kPi * random.uniform_double();
-  const double r = std::sqrt(1.0 - z * z);
-  return {r * std::cos(phi), r * std::sin(phi), z};
-}
-
 const SurfacePoint kFar = {Vec2(0.3F, 0.1F), 1000.0F};
 
 /// Mean of the values at a grid of points over `size` mm, each seen with the footprint.
@@ -60,8 +54,8 @@ TEST(WovenCottonLaw, BrdfIsTheMeanOfTheBtf) {
   const Vec2d repeat = 0.25 * Vec2d(4, 8);
   RandomStream random(1, RandomStage::kTest, 0, 0);
   for (int n = 0; n < 4; ++n) {
-    const Vec3d wi = random_direction(random, 0.5);
-    const Vec3d wo = random_direction(random, 0.5);
+    const Vec3d wi = test::direction_above(0.5, random);
+    const Vec3d wo = test::direction_above(0.5, random);
     const Rgbd far = model.reflected(kFar, wi, wo);
     const Rgbd near = mean_over(model, {0, 0}, repeat, 1000, 0.0F, wi, wo);
     // The highlight is a step: 1e-3 of its height, which is k_s F G / (n . wo).
@@ -94,8 +88,8 @@ TEST(WovenCottonAgreement, FootprintIsTheMeanOverItsSquare) {
     const WovenCotton model = model_of(config(irregular ? kIrregular : ""));
     RandomStream random(2, RandomStage::kTest, 0, 0);
     for (const double footprint : {0.003, 0.2, 0.7, 1.9}) {
-      const Vec3d wi = random_direction(random, 0.7);
-      const Vec3d wo = random_direction(random, 0.7);
+      const Vec3d wi = test::direction_above(0.7, random);
+      const Vec3d wo = test::direction_above(0.7, random);
       const Vec2d at(10.0 * random.uniform_double(), 10.0 * random.uniform_double());
       const Rgbd value = model.reflected({at.cast<float>(), static_cast<float>(footprint)}, wi, wo);
       const Rgbd mean = mean_over(model, at - Vec2d::Constant(0.5 * footprint),
@@ -162,8 +156,8 @@ TEST(WovenCottonLaw, IrregularityHasMeanZero) {
     double by_irregularity = 0.0;
     double by_change = 0.0;
     for (int n = 0; n < 200; ++n) {
-      const Vec3d wi = random_direction(random, 0.6);
-      const Vec3d wo = random_direction(random, 0.6);
+      const Vec3d wi = test::direction_above(0.6, random);
+      const Vec3d wo = test::direction_above(0.6, random);
       const double value = regular.reflected(kFar, wi, wo)[0];
       by_irregularity += std::abs(irregular.reflected(kFar, wi, wo)[0] - value);
       by_change += std::abs(changed.reflected(kFar, wi, wo)[0] - value);
@@ -182,8 +176,8 @@ TEST(WovenCotton, IrregularityIsReproducible) {
   int differ = 0;
   for (int n = 0; n < 2000; ++n) {
     const SurfacePoint point = {Vec2(50.0F * random.uniform(), -50.0F * random.uniform()), 0.1F};
-    const Vec3d wi = random_direction(random, 0.8);
-    const Vec3d wo = random_direction(random, 0.8);
+    const Vec3d wi = test::direction_above(0.8, random);
+    const Vec3d wo = test::direction_above(0.8, random);
     EXPECT_EQ((a.reflected(point, wi, wo) - b.reflected(point, wi, wo)).abs().maxCoeff(), 0.0);
     differ += (a.reflected(point, wi, wo) - other.reflected(point, wi, wo)).abs().maxCoeff() > 0.0
                   ? 1
@@ -193,8 +187,8 @@ TEST(WovenCotton, IrregularityIsReproducible) {
   // Along a yarn with per = "yarn" every segment looks the same; here the first end, which starts
   // with a warp float.
   const WovenCotton yarns = model_of(config(std::string(kIrregular) + "per = \"yarn\"\n"));
-  const Vec3d wi = random_direction(random, 0.8);
-  const Vec3d wo = random_direction(random, 0.8);
+  const Vec3d wi = test::direction_above(0.8, random);
+  const Vec3d wo = test::direction_above(0.8, random);
   const Rgbd value = yarns.reflected({Vec2(0.125F, 0.25F), 0.2F}, wi, wo);
   for (int n = 1; n < 20; ++n) {
     const Rgbd further =
@@ -209,8 +203,8 @@ TEST(WovenCottonLaw, BtfAndBrdfAreReciprocal) {
   for (int n = 0; n < 5000; ++n) {
     const SurfacePoint point = {Vec2(random.uniform(), random.uniform()),
                                 n % 2 == 0 ? 100.0F : 0.5F};
-    const Vec3d wi = random_direction(random, 1e-3);
-    const Vec3d wo = random_direction(random, 1e-3);
+    const Vec3d wi = test::direction_above(1e-3, random);
+    const Vec3d wo = test::direction_above(1e-3, random);
     const Rgbd forth = model.reflected(point, wi, wo) / wi.z();
     const Rgbd back = model.reflected(point, wo, wi) / wo.z();
     EXPECT_LT(((forth - back).abs() / (forth + 1e-12)).maxCoeff(), 1e-9);
@@ -225,7 +219,7 @@ TEST(WovenCottonStability, FiniteAndNotNegativeForRandomAndGrazingPairs) {
     for (int n = 0; n < 150000; ++n) {
       // Heights down to 1e-300 above the horizon, mirror pairs and opposite pairs among them.
       const auto direction = [&] {
-        Vec3d w = random_direction(random);
+        Vec3d w = test::direction_above(0, random);
         if (n % 4 == 1) w.z() = std::pow(10.0, -300.0 * random.uniform_double());
         return Vec3d(w.normalized());
       };

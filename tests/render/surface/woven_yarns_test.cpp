@@ -11,6 +11,7 @@
 #include "fibers/math/special_functions.h"
 #include "formats/input_error.h"
 #include "render/surface/surface_presets.h"
+#include "tests/support/directions.h"
 #include "tests/support/statistics.h"
 
 namespace heddle {
@@ -31,13 +32,6 @@ const YarnSegment kSegments[] = {
     {material(0, 40, 0), 1, 3},   {material(0, 50, -0.9), 2, 4},  {material(0, 25, 2.0, 0.4), 1, 2},
     {material(-30, 24, 0), 1, 6}, {material(30, 36, -0.5), 2, 4}, {material(20, 45, 1.0), 1, 1},
 };
-
-Vec3d random_direction(RandomStream& random, double min_z = 0.0) {
-  const double z = min_z + (1.0 - min_z) * random.uniform_double();
-  const double phi = 2.0 * kPi * random.uniform_double();
-  const double r = std::sqrt(1.0 - z * z);
-  return {r * std::cos(phi), r * std::sin(phi), z};
-}
 
 TEST(WovenYarnsLaw, SpineSpansItsSegment) {
   for (const double kappa : {-0.99, -0.7, -0.3, 0.0, 0.5, 4.0}) {
@@ -124,8 +118,8 @@ TEST(WovenYarnsAgreement, MeanOfASegmentIsTheIntegralOverItsTube) {
     double largest = 0.0;
     double worst = 0.0;
     for (int n = 0; n < 12; ++n) {
-      const Vec3d wi = random_direction(random, 0.3);
-      const Vec3d wo = random_direction(random, 0.3);
+      const Vec3d wi = test::direction_above(0.3, random);
+      const Vec3d wo = test::direction_above(0.3, random);
       // Keep off the ends of the spine, where the Gaussian of the oracle is cut in half.
       const double u = std::atan2((wi + wo).y(), (wi + wo).z());
       if (segment.material.twist == 0.0 &&
@@ -153,8 +147,8 @@ TEST(WovenYarnsLaw, IntegralIsThatOfThePoints) {
     double largest = 0.0;
     double worst = 0.0;
     for (int n = 0; n < 20; ++n) {
-      const Vec3d wi = random_direction(random, 0.2);
-      const Vec3d wo = random_direction(random, 0.2);
+      const Vec3d wi = test::direction_above(0.2, random);
+      const Vec3d wo = test::direction_above(0.2, random);
       Rectangle part = {-half, half};
       if (n % 2 == 1) part = {-0.6 * half, Vec2d(0.9 * half.x(), 0.3 * half.y())};
       constexpr int kGrid = 300;
@@ -185,8 +179,8 @@ TEST(WovenYarnsLaw, SegmentsAreReciprocal) {
   for (const YarnSegment& segment : kSegments) {
     const Vec2d half(0.5 * segment.width, 0.5 * segment.length);
     for (int n = 0; n < 2000; ++n) {
-      const Vec3d wi = random_direction(random, 1e-3);
-      const Vec3d wo = random_direction(random, 1e-3);
+      const Vec3d wi = test::direction_above(1e-3, random);
+      const Vec3d wo = test::direction_above(1e-3, random);
       const double forth = yarn_highlight_integral(segment, {-half, half}, wi, wo);
       EXPECT_NEAR(yarn_highlight_integral(segment, {-half, half}, wo, wi), forth, 1e-9 * forth);
     }
@@ -204,8 +198,8 @@ TEST(WovenYarnsLaw, WeftIsWarpTurned) {
   int differ = 0;
   for (int n = 0; n < 2000; ++n) {
     const auto turned = [](const Vec3d& w) { return Vec3d(-w.y(), w.x(), w.z()); };
-    const Vec3d wi = random_direction(random, 0.1);
-    const Vec3d wo = random_direction(random, 0.1);
+    const Vec3d wi = test::direction_above(0.1, random);
+    const Vec3d wo = test::direction_above(0.1, random);
     const Vec2 at(random.uniform(), random.uniform());
     const float footprint = n % 3 == 0 ? 0.0F : n % 3 == 1 ? 0.2F : 100.0F;
     const double value = model.reflected({at, footprint}, wi, wo)[0];
@@ -271,7 +265,7 @@ TEST(WovenYarnsStability, FiniteAndNotNegativeForRandomAndGrazingPairs) {
     const std::unique_ptr<const SurfaceModel> model = read_surface_model(surface_preset(name));
     for (int n = 0; n < 20000; ++n) {
       const auto direction = [&] {
-        Vec3d w = random_direction(random);
+        Vec3d w = test::direction_above(0, random);
         if (n % 4 == 1) w.z() = std::pow(10.0, -300.0 * random.uniform_double());
         return Vec3d(w.normalized());
       };
