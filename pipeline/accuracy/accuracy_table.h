@@ -80,10 +80,6 @@ struct AccuracyTable {
   Accuracy at_bent(const std::string& setting, double sharpness) const;
   /// bent_between, linear in the logarithm of sharpness; 0 where there is none.
   double between_at(double sharpness) const;
-  /// Squared error of the mean colour, part of bias_square: relative to the squared mean radiance.
-  double mean_square(const Rgbd& color_ratio) const {
-    return (color * (color_ratio - 1)).square().mean();
-  }
 };
 
 nlohmann::ordered_json accuracy_json(const AccuracyTable& table);

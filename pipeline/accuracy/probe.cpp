@@ -98,24 +98,6 @@ Estimate sample_variance_of_all(const FrameBuffers& frame) {
   return {sum / count, std::sqrt(squares) / count};
 }
 
-Estimate squared_bias_of_means(std::span<const FrameBuffers> blocks,
-                               std::span<const FrameBuffers> reference) {
-  assert(blocks.size() == reference.size());
-  std::vector<double> sums;
-  std::vector<double> pixels;
-  for (std::size_t b = 0; b < blocks.size(); ++b) {
-    Rgbd d0 = Rgbd::Zero();
-    Rgbd d1 = Rgbd::Zero();
-    for (std::size_t k = 0; k < blocks[b].pixel_count(); ++k) {
-      d0 += (blocks[b].half0[k] - reference[b].half0[k]).cast<double>();
-      d1 += (blocks[b].half1[k] - reference[b].half1[k]).cast<double>();
-    }
-    pixels.push_back(static_cast<double>(blocks[b].pixel_count()));
-    sums.push_back((d0 * d1).mean() / pixels.back());
-  }
-  return mean_of(sums, pixels);
-}
-
 Estimate squared_bias(std::span<const FrameBuffers> blocks,
                       std::span<const FrameBuffers> reference) {
   assert(blocks.size() == reference.size());

@@ -38,11 +38,6 @@ Estimate sample_variance(std::span<const FrameBuffers> blocks);
 /// paths make the noise, that is most of it.
 Estimate sample_variance_of_all(const FrameBuffers& frame);
 
-/// The same where the difference changes little within a block: of the blocks' means, in which far
-/// less noise is left. What changes within a block is missing.
-Estimate squared_bias_of_means(std::span<const FrameBuffers> blocks,
-                               std::span<const FrameBuffers> reference);
-
 /// bias^2 as above. [block] of the same rectangles, any number of samples.
 Estimate squared_bias(std::span<const FrameBuffers> blocks,
                       std::span<const FrameBuffers> reference);

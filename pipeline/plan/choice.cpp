@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <utility>
 
 #include "pipeline/plan/policy.h"
 
@@ -44,10 +43,6 @@ std::optional<Offer> offer(const Candidate& candidate, double tolerance, int pic
   return result;
 }
 
-bool may_miss(const Candidate& candidate, double tolerance) {
-  return cautious(candidate.bias_square, kPolicy.doubt) > kPolicy.aim * tolerance * tolerance;
-}
-
 int first_samples(const Candidate& candidate, double tolerance) {
   const double left = room(candidate, tolerance);
   return left > 0 ? in_steps(std::max(2.0, candidate.noise_square.value / left), candidate.spp_step)
@@ -74,37 +69,6 @@ std::optional<std::size_t> cheapest(std::span<const Candidate> candidates, doubl
     seconds = made->seconds;
   }
   return best;
-}
-
-std::optional<std::size_t> choose(std::span<const Candidate> candidates,
-                                  const std::vector<bool>& tried, double tolerance, int pictures) {
-  const std::optional<std::size_t> cheapest_of_all = cheapest(candidates, tolerance, pictures);
-  if (!cheapest_of_all) return {};
-  const double most_seconds =
-      kPolicy.little_more * offer(candidates[*cheapest_of_all], tolerance, pictures)->seconds;
-  std::vector<std::size_t> rivals;
-  bool any_tried = false;
-  for (std::size_t k = 0; k < candidates.size(); ++k) {
-    const std::optional<Offer> made = offer(candidates[k], tolerance, pictures);
-    if (!made || made->seconds > most_seconds) continue;
-    rivals.push_back(k);
-    any_tried = any_tried || tried[k];
-  }
-  if (any_tried) std::erase_if(rivals, [&](std::size_t k) { return !tried[k]; });
-  const auto bias = [&](std::size_t k) {
-    return cautious(candidates[k].bias_square, kPolicy.more_caution);
-  };
-  const double least =
-      bias(*std::min_element(rivals.begin(), rivals.end(),
-                             [&](std::size_t a, std::size_t b) { return bias(a) < bias(b); }));
-  std::erase_if(rivals, [&](std::size_t k) {
-    return bias(k) > least + kPolicy.little_bias * tolerance * tolerance;
-  });
-  const auto rank = [&](std::size_t k) {
-    return std::pair(candidates[k].changes, offer(candidates[k], tolerance, pictures)->seconds);
-  };
-  return *std::min_element(rivals.begin(), rivals.end(),
-                           [&](std::size_t a, std::size_t b) { return rank(a) < rank(b); });
 }
 
 double best_tolerance(std::span<const Candidate> candidates) {

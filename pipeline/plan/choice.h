@@ -10,7 +10,6 @@
 #include <optional>
 #include <span>
 #include <string>
-#include <vector>
 
 #include "pipeline/accuracy/probe.h"
 
@@ -25,7 +24,6 @@ struct Candidate {
   double setup_seconds = 0;    // of every picture
   double seconds_per_spp = 0;  // of every picture
   int spp_step = 1;            // samples come in multiples of this
-  int changes = 0;             // settings that are not the fabrics' own
 };
 
 /// What a candidate takes to meet a tolerance.
@@ -41,10 +39,6 @@ struct Offer {
 inline constexpr int kMostSamples = 1 << 20;
 std::optional<Offer> offer(const Candidate& candidate, double tolerance, int pictures);
 
-/// Is the bias alone too large for the tolerance, if it is PlanPolicy::doubt standard errors larger
-/// than expected?
-bool may_miss(const Candidate& candidate, double tolerance);
-
 /// The samples of a picture to begin with: as many as the expected noise needs, without caution.
 /// The picture itself then says how many more (more_samples). At least 2, which show noise.
 int first_samples(const Candidate& candidate, double tolerance);
@@ -58,12 +52,6 @@ int more_samples(const Candidate& candidate, const Estimate& noise_square, int d
 /// The cheapest of those that meet the tolerance; nothing where none does.
 std::optional<std::size_t> cheapest(std::span<const Candidate> candidates, double tolerance,
                                     int pictures);
-
-/// Of the cheapest and its rivals, which cost little more: one whose kind was tried (`tried`) if
-/// there is one, since trying costs; of these the ones with the least bias, since noise alone can
-/// be mended; of these the one with the fewest changes.
-std::optional<std::size_t> choose(std::span<const Candidate> candidates,
-                                  const std::vector<bool>& tried, double tolerance, int pictures);
 
 /// The smallest tolerance that some candidate meets.
 double best_tolerance(std::span<const Candidate> candidates);

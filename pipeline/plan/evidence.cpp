@@ -29,23 +29,10 @@ Estimate posterior(const Estimate& prior, const PilotOfWay& pilot) {
   const Estimate& measured = pilot.bias_square;
   const Estimate raised = weighed(prior, measured, pilot.unseen);
   if (raised.value > prior.value) return raised;
-  if (!pilot.may_lower) return prior;
   const double error = std::max(measured.error, -measured.value);
   const Estimate doubted{std::max(0.0, measured.value) + kPolicy.doubt_of_less * error, error};
   const Estimate lowered = weighed(prior, doubted, pilot.unseen);
   return lowered.value < prior.value ? lowered : prior;
-}
-
-Estimate transferred(const Estimate& prior, const Estimate& prior_of_similar,
-                     const Estimate& posterior_of_similar) {
-  const double value =
-      posterior_of_similar.value >= prior_of_similar.value || !(prior_of_similar.value > 0)
-          ? prior.value + posterior_of_similar.value - prior_of_similar.value
-          : prior.value * std::max(0.0, posterior_of_similar.value) / prior_of_similar.value;
-  const double of_table = kPolicy.table_error;
-  return {value, std::min(std::hypot(posterior_of_similar.error,
-                                     of_table * (prior.value - prior_of_similar.value)),
-                          std::hypot(prior.error, of_table * (value - prior.value)))};
 }
 
 }  // namespace heddle

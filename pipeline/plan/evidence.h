@@ -21,18 +21,11 @@ struct PilotOfWay {
   Estimate bias_square;
   double samples = 0;  // of paths that it was compared with
   double unseen = 0;   // share of the picture's pixels
-  /// A pilot that met no rare large square says too little: it may lower the prior only where the
-  /// way would not have been chosen otherwise.
-  bool may_lower = false;
 };
 
-/// The prior after the pilot: raised, or lowered with caution where that is allowed.
+/// The prior after the pilot: raised, or lowered with caution, since a pilot that met no rare large
+/// square says too little.
 Estimate posterior(const Estimate& prior, const PilotOfWay& pilot);
-
-/// The squared error of a way from what a pilot showed of a similar one: above its own prior by the
-/// same difference, or below it by the same factor.
-Estimate transferred(const Estimate& prior, const Estimate& prior_of_similar,
-                     const Estimate& posterior_of_similar);
 
 }  // namespace heddle
 

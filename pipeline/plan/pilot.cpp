@@ -38,7 +38,6 @@ Pilot PilotRenderer::render(RenderMethod method, int spp, const PilotKind& kind)
   request.method = method;
   request.spp = spp;
   request.seed += kPolicy.pilot_seed;
-  request.local = kind.local;
   const Stopwatch watch;
   SceneJob::Crops crops = job.render_crops(request, blocks_, kind.transfer_order);
   loading_ = loading_ + (watch.elapsed() - crops.setup - crops.rendering);

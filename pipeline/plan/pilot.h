@@ -27,7 +27,6 @@ struct Pilot {
 /// What is rendered besides method and samples.
 struct PilotKind {
   SceneVariant variant = {};
-  bool local = false;                      // paths end where they leave a cloth
   std::optional<int> transfer_order = {};  // harmonics of the transfer are cut to this order
 };
 

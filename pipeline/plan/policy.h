@@ -51,8 +51,6 @@ struct PlanPolicy {
   double table_samples = 4e6;
 
   // --- Evidence: what pilots say ---
-  /// Relative standard error of a fast way's mean radiance beyond what the table says of it.
-  double mean_error = 0.07;
   /// Relative standard error of a pilot's squared error, times the root of the share of pixels that
   /// it left out: few pixels hold most of the squares.
   double pilot_error = 0.4;
@@ -68,18 +66,13 @@ struct PlanPolicy {
   // --- Choice ---
   /// Standard errors added to a bias before it is compared: more turns fast methods away, less
   /// misses.
-  double caution = 0.25;
+  double caution = 0.5;
   /// Share of the squared tolerance that is aimed at: a picture's noise is itself uncertain.
   double aim = 0.89;
   /// Standard errors added to the bias where they cost few samples: safety that is nearly free.
   double more_caution = 1;
   /// Share of its room that noise keeps under that caution: that many more samples at most.
   double room_kept = 0.88;
-  /// Ways that cost so much more than the cheapest are rivals of it: costs are not known better.
-  double little_more = 1.25;
-  /// Squared errors that differ by this share of the squared tolerance are alike: priors are not
-  /// known better, and the fewest changes decide.
-  double little_bias = 0.02;
 
   // --- Finding out more ---
   /// Pilots after the first at most: an end where two ways take turns.
@@ -90,9 +83,6 @@ struct PlanPolicy {
   /// Share of the offer's time that a larger pilot of paths may take: it must stay
   /// small beside the picture.
   double pilot_share = 0.08;
-  /// Relative standard error at which the noise of paths is known well enough: less than what
-  /// separates rivals.
-  double noise_known = 0.08;
   /// A way is tried to be cheaper if it would take at most this share of the offer's time: less is
   /// not worth a trial.
   double cheaper_share = 0.5;
@@ -100,14 +90,6 @@ struct PlanPolicy {
   double build_share = 0.25;
   /// Standard errors by which it may be better than expected: about one way in four is.
   double optimism = 0.7;
-  /// Standard errors more at which a choice may miss: squared errors have long tails.
-  double doubt = 2;
-  /// Share of the offer's time that a second look at such a choice may take: a miss costs the whole
-  /// picture.
-  double doubt_share = 0.25;
-  /// Light between cloths is known well enough at this standard error, relative to the squared
-  /// tolerance: it then moves the expected error by 2 to 3 %.
-  double between_known = 0.05;
   /// A pilot is useful if its standard error is at most this share of that of what is known: one
   /// that is noisier hardly changes it.
   double useful_pilot = 0.8;

@@ -10,65 +10,31 @@
 namespace heddle {
 namespace {
 
-/// An error in two parts: that of the mean colour, of which several add up, and the rest, whose
-/// squares do. What folds do to the mean is kept apart: it does not make good where else a setting
-/// is too bright.
-struct Parts {
-  Rgbd flat_ratio;
-  Rgbd folds_ratio;
-  double rest_square;
-
-  void add(const Parts& to, const Parts& from) {
-    folds_ratio *= to.flat_ratio / from.flat_ratio.max(1e-3);
-    rest_square += to.rest_square - from.rest_square;
-  }
-  /// What a setting changes is known without the noise of path tracing, but not whether it makes
-  /// the error that is there smaller or larger: larger by part of the change at least.
-  void change(const Parts& to, const Parts& from, double change_square, bool in_folds) {
-    (in_folds ? folds_ratio : flat_ratio) *= to.flat_ratio / from.flat_ratio.max(1e-3);
-    rest_square +=
-        std::max(to.rest_square - from.rest_square, kPolicy.change_share * change_square);
-  }
-};
-
-Parts parts_of(const AccuracyTable& table, const Accuracy& entry) {
-  return {entry.color_ratio, Rgbd::Ones(),
-          entry.bias_square - table.mean_square(entry.color_ratio)};
-}
-
-/// The error under one light, and the standard error of its square.
-struct PartsUnderLight {
-  Parts parts;
-  double error;
-};
-PartsUnderLight parts_under(const LightShare& light, const AccuracyTable& table,
-                            const TableSettings& settings, double footprint_mm, bool bent) {
-  const Accuracy base = table.at(settings.base, light.sharpness, footprint_mm, light.cosine);
-  PartsUnderLight result{parts_of(table, base), base.bias_square_error};
+/// The squared error under one light.
+Estimate square_under(const LightShare& light, const AccuracyTable& table,
+                      const TableSettings& settings, double footprint_mm, bool bent) {
+  const auto at = [&](const std::string& setting) {
+    return table.at(setting, light.sharpness, footprint_mm, light.cosine);
+  };
+  const Accuracy base = at(settings.base);
+  Estimate square{base.bias_square, base.bias_square_error};
   for (const auto& [setting, of] : settings.changes) {
-    const Accuracy flat[] = {table.at(setting, light.sharpness, footprint_mm, light.cosine),
-                             table.at(of, light.sharpness, footprint_mm, light.cosine)};
-    const Accuracy folded[] = {table.at_bent(setting, light.sharpness),
-                               table.at_bent(of, light.sharpness)};
-    // Where light grazes, a setting may matter more.
-    const bool more_in_folds = bent && folded[0].bias_square - folded[1].bias_square >
-                                           flat[0].bias_square - flat[1].bias_square;
-    const Accuracy* of_cloth = more_in_folds ? folded : flat;
-    result.error = std::max(result.error, of_cloth->bias_square_error);
-    result.parts.change(parts_of(table, of_cloth[0]), parts_of(table, of_cloth[1]),
-                        of_cloth->change_square, more_in_folds);
+    // What a setting changes is known without the noise of path tracing, but not whether it makes
+    // the error that is there smaller or larger: larger by part of the change at least.
+    const Accuracy changed = at(setting);
+    square.value += std::max(changed.bias_square - at(of).bias_square,
+                             kPolicy.change_share * changed.change_square);
+    square.error = std::max(square.error, changed.bias_square_error);
   }
-  if (bent) {
-    // What folds add to a flat swatch seen from as far.
-    const Accuracy flat =
-        table.at(settings.base, light.sharpness, table.bent_footprint_mm, table.bent_light_cosine);
-    const Accuracy folded = table.at_bent(settings.base, light.sharpness);
-    if (folded.bias_square > flat.bias_square)
-      result.parts.add(parts_of(table, folded), parts_of(table, flat));
-    // Other folds show other pairs of view and light, but many of them.
-    result.error = folded.bias_square_error;
-  }
-  return result;
+  if (!bent) return square;
+  // What folds add to a flat swatch seen from as far.
+  const Accuracy flat =
+      table.at(settings.base, light.sharpness, table.bent_footprint_mm, table.bent_light_cosine);
+  const Accuracy folded = table.at_bent(settings.base, light.sharpness);
+  square.value += std::max(0.0, folded.bias_square - flat.bias_square);
+  // Other folds show other pairs of view and light, but many of them.
+  square.error = folded.bias_square_error;
+  return square;
 }
 
 }  // namespace
@@ -98,31 +64,23 @@ TableSettings table_settings_of(const WaySettings& way, const SceneVariant::OfFa
 
 ClothPrior prior_of_cloth(const AccuracyTable& table, const TableSettings& settings,
                           const SeenCloth& cloth, bool bent) {
-  Rgbd flat_error = Rgbd::Zero();   // of the mean
-  Rgbd folds_error = Rgbd::Zero();  // what folds add to it
-  OverLights rest;                  // of errors apart from the mean's
+  OverLights squares;
   double error = 0;
   double noise = 0;
   double path_noise = 0;
   for (const LightShare& light : cloth.lights) {
-    const auto [parts, unsure] = parts_under(light, table, settings, cloth.footprint_mm, bent);
-    flat_error += light.weight * (parts.flat_ratio - 1);
-    folds_error += light.weight * (parts.folds_ratio - 1);
-    rest.add(light.weight, std::max(0.0, parts.rest_square));
+    const Estimate square = square_under(light, table, settings, cloth.footprint_mm, bent);
+    squares.add(light.weight, square.value);
     const double weight = light.weight * light.weight;
     const auto noise_of = [&](const std::string& setting) {
       return table.at(setting, light.sharpness, cloth.footprint_mm, light.cosine).noise_square;
     };
-    error += weight * unsure;
+    error += weight * square.error;
     noise += weight * noise_of(settings.base);
     path_noise += weight * noise_of("path");
   }
   ClothPrior prior;
-  const double of_mean = table.mean_square(1 + flat_error) + table.mean_square(1 + folds_error) +
-                         2 * (table.color.square() * (flat_error * folds_error).max(0)).mean();
-  const double square = of_mean + rest.square();
-  prior.bias_square = {square, std::hypot(error, kPolicy.table_error * square)};
-  prior.mean_error = (table.color * (flat_error + folds_error)).mean();
+  prior.bias_square = {squares.square(), std::hypot(error, kPolicy.table_error * squares.square())};
   if (path_noise > 0) prior.noise_ratio = noise / path_noise;
   double seconds = table.setting(settings.base).seconds_per_sample;
   for (const auto& [setting, of] : settings.changes)
@@ -134,19 +92,16 @@ ClothPrior prior_of_cloth(const AccuracyTable& table, const TableSettings& setti
 
 void add_light_from_behind(const SeenCloth& cloth, double through, ClothPrior& prior) {
   double all = 0;
-  double missing = 0;
   double squares = 0;
   for (const PixelLight& light : cloth.pixel_lights) {
     const double behind = light.back.shown(through);
     all += light.face.shown(through) + behind;
-    missing += behind;
     squares += behind * behind;
   }
-  if (!(missing > 0)) return;
+  if (!(squares > 0)) return;
   const double square = squares * static_cast<double>(cloth.pixel_lights.size()) / (all * all);
   prior.bias_square.value += square;
   prior.bias_square.error = std::hypot(prior.bias_square.error, kPolicy.table_error * square);
-  prior.mean_error -= missing / all;
 }
 
 WayPrior prior_of_way(const WaySettings& way, const SceneConfig& scene, const ViewFacts& view,
@@ -176,7 +131,6 @@ WayPrior prior_of_way(const WaySettings& way, const SceneConfig& scene, const Vi
     const double weight = seen.square_weight();
     prior.bias_square.value += weight * of_cloth.bias_square.value;
     prior.bias_square.error += weight * of_cloth.bias_square.error;
-    prior.mean_error += seen.light_share * of_cloth.mean_error;
     noise += weight * of_cloth.noise_ratio;
     noise_weight += weight;
     time += seen.share * of_cloth.time_ratio;

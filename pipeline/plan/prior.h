@@ -4,10 +4,8 @@
 // the light and the width of pixels on each cloth. Pure functions. Tested in
 // tests/pipeline/plan_test.cpp.
 //
-// An error has two parts. Errors of the mean colour add up: over settings, over lights, and with
-// light that a way lacks altogether. Of the rest the squares add up; over lights half as if the
-// errors were the same, half as if they were independent. Squared errors are relative to the
-// squared mean radiance.
+// Squared errors are relative to the squared mean radiance. They add up over settings and cloths;
+// over lights half as if the errors were the same, half as if they were independent.
 
 #include <string>
 #include <utility>
@@ -42,7 +40,6 @@ TableSettings table_settings_of(const WaySettings& way, const SceneVariant::OfFa
 /// relative to path tracing.
 struct ClothPrior {
   Estimate bias_square;
-  double mean_error = 0;  // of the mean radiance, relative, signed; part of bias_square
   double noise_ratio = 1;
   double time_ratio = 1;
   double setup_seconds = 0;  // per light
@@ -58,7 +55,6 @@ void add_light_from_behind(const SeenCloth& cloth, double through, ClothPrior& p
 /// The same of a way and the whole picture.
 struct WayPrior {
   Estimate bias_square;  // without light between cloths
-  double mean_error = 0;
   double noise_ratio = 1;
   double time_ratio = 1;
   double setup_seconds = 0;  // of a picture

@@ -34,24 +34,18 @@ class Search {
   std::optional<std::size_t> choose_way();
 
  private:
-  std::optional<std::size_t> choose_now() const;
+  std::optional<std::size_t> cheapest_way() const;
   Offer offer_of(std::size_t way) const;
+  bool try_choice(std::size_t chosen);
   bool try_cheaper(std::size_t chosen);
-  bool learn(std::size_t chosen);
-  bool find_out(std::size_t way, double affordable, bool may_lower);
-  void try_out(std::size_t way, bool may_lower);
+  void try_out(std::size_t way);
   void measure_stress();
 
-  bool has_rival(std::size_t chosen) const;
   bool may_try(std::size_t way) const;
   int samples_to_try(std::size_t way) const;
   double seconds_to_try(std::size_t way) const;
   double pilot_error(double samples) const;
-  double seconds_per_path() const;
-
-  bool more_paths(double wanted, double affordable);
-  bool know_light_between(const Offer& offered);
-  void trace_local();
+  bool more_paths(double wanted, double affordable, double known);
 
   Target target_;
   PilotRenderer* renderer_;

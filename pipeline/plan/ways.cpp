@@ -104,14 +104,6 @@ std::string name_of(const WaySettings& way, const SceneConfig& scene) {
   return name;
 }
 
-int changes_of(const WaySettings& way) {
-  const SceneVariant::OfFabric of = shared_settings(way);
-  return static_cast<int>(way.variant.stand_ins.size()) +
-         static_cast<int>(way.variant.blend != VisibilityBlend{}) +
-         static_cast<int>(of.order.has_value()) + static_cast<int>(of.variant.cell_size != 1) +
-         static_cast<int>(of.variant.voxel_rate != 1);
-}
-
 std::vector<WaySettings> other_ways(const SceneConfig& scene, const ViewFacts& view,
                                     const FabricTables& tables) {
   std::vector<WaySettings> ways;

@@ -36,9 +36,6 @@ std::string kind_of(const WaySettings& way);
 
 /// For people: method and what differs from the fabrics' own settings.
 std::string name_of(const WaySettings& way, const SceneConfig& scene);
-/// How many settings differ from the fabrics' own.
-int changes_of(const WaySettings& way);
-
 /// All ways but path tracing.
 std::vector<WaySettings> other_ways(const SceneConfig& scene, const ViewFacts& view,
                                     const FabricTables& tables);

@@ -102,23 +102,6 @@ TEST(ProbeStatistical, BiasIsFoundUnderNoise) {
   }
 }
 
-TEST(ProbeStatistical, SmoothDifferencesAreFoundUnderMuchNoise) {
-  const Drawn drawn = draw(0, 0, 5.0, 8);
-  std::vector<FrameBuffers> brighter = drawn.picture;
-  for (FrameBuffers& frame : brighter) {
-    for (std::vector<Rgb>* half : {&frame.half0, &frame.half1}) {
-      for (Rgb& value : *half) value += 0.3F;
-    }
-  }
-  const Estimate square = squared_bias_of_means(brighter, drawn.reference);
-  EXPECT_NEAR(square.value, 0.09, 4 * square.error);
-  // Of a block's half, of 64 pixels and 4 samples, in each of two pictures; and its product with
-  // the difference.
-  const double variance = 2 * 25.0 / (64 * 4);
-  EXPECT_LT(square.error, 2 * std::sqrt((variance * variance + 2 * variance * 0.09) / 64));
-  EXPECT_GT(squared_bias(brighter, drawn.reference).error, 5 * square.error);
-}
-
 /// A picture of 64 x 64 pixels with so many samples, whose noise doubles every 32 columns and of
 /// which a share of samples is bright.
 FrameBuffers noisy(int samples, double share_of_bright, double bright, std::uint32_t seed) {

@@ -708,6 +708,8 @@ void store_table(const Workshop& shop, double bias) {
   table.light_cosine = {0.5};
   table.bent_footprint_mm = 3;
   table.bent_light_cosine = 0.5;
+  table.bent_between = {0.2, 0.2};
+  table.bent_enclosure_square = 0.02;
   table.through = 0.5;
   const auto add = [&](const std::string& name, double bias_of_this, double noise, double seconds) {
     const Accuracy entry{bias_of_this * bias_of_this, 0, noise * noise, 0, Rgbd::Ones()};

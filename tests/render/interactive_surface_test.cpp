@@ -15,7 +15,7 @@ namespace heddle {
 namespace {
 
 MicrocylinderFabric linen_preset() {
-  const TomlTable document = surface_preset("linen_preset-plain");
+  const TomlTable document = surface_preset("linen-plain");
   return read_microcylinder_fabric(document);
 }
 
@@ -76,7 +76,7 @@ TEST(InteractiveSurfaceAgreement, APictureIsNearThePathTracedOne) {
   const TriangleMesh roof{{Vec3(0.5F, -3, 1), Vec3(4, -3, 1), Vec3(4, 3, 1), Vec3(0.5F, 3, 1)},
                           {{0, 1, 2}, {0, 2, 3}}};
   const std::vector<SurfaceCloth> cloth = {
-      {read_surface_model(surface_preset("linen_preset-plain")), flat_cloth(4, 4, 24)}};
+      {read_surface_model(surface_preset("linen-plain")), flat_cloth(4, 4, 24)}};
   const ClothScene open({}, {}, cloth);
   const ClothScene covered({}, {roof}, cloth);
   const std::vector<Light> lights = {gaussian({-0.3F, 0.2F, 1}, 60),
@@ -94,7 +94,7 @@ TEST(InteractiveSurface, BothSidesShowTheFaceWithTheirOwnShadows) {
   const TriangleMesh floor{{Vec3(-90, -90, -0.5F), Vec3(90, -90, -0.5F), Vec3(0, 90, -0.5F)},
                            {{0, 1, 2}}};
   const std::vector<SurfaceCloth> cloth = {
-      {read_surface_model(surface_preset("linen_preset-plain")), flat_cloth(4, 4, 4)}};
+      {read_surface_model(surface_preset("linen-plain")), flat_cloth(4, 4, 4)}};
   const ClothScene scene({}, {floor}, cloth);
   const ClothScene open({}, {}, cloth);
   const auto light_on = [](const ClothScene& in, float side, const Light& light) {
@@ -120,7 +120,7 @@ TEST(InteractiveSurface, ShellsOfFibersHideLight) {
   const auto tile = std::make_shared<TileScene>(single_fiber(test_cotton()));
   const ClothScene scene(
       {{tile, lifted(flat_cloth(30, 30), {0, 0, 1})}}, {},
-      {{read_surface_model(surface_preset("linen_preset-plain")), flat_cloth(2, 2, 2)}});
+      {{read_surface_model(surface_preset("linen-plain")), flat_cloth(2, 2, 2)}});
   const DistanceMaps maps = bake_distance_maps(scene, scene.surfaces()[0], ClothSide::kFace);
   EXPECT_LT(maps.evaluate(maps.coefficients(4), Vec3d(0, 0, 1)).distance, -radians(60));
 }
