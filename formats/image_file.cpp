@@ -211,7 +211,8 @@ class ExrHeader {
       std::getline(file, text, '\0');
       return !text.empty();
     };
-    while (skip_text() && skip_text()) {
+    while (skip_text()) {        // the attribute's name
+      if (!skip_text()) return;  // its type
       std::int32_t size = 0;
       file.read(reinterpret_cast<char*>(&size), sizeof(size));  // little-endian, as this machine
       const auto at = static_cast<std::uint64_t>(file.tellg());

@@ -168,14 +168,14 @@ class ChartMaker {
     write_png(file(key + ".png"), picture.image.width, picture.image.height,
               tone_map(layer_of(picture.image, "", key), 0));
     write_exr(file(key + ".exr"), picture.image);
-    const Json record = {{"key", key},
-                         {"picture", json_of(seal_of_file(file(key + ".exr")))},
-                         {"program_version", kProgramVersion},
-                         {"processor", processor_},
-                         {"threads", working_threads()},
-                         {"render_seconds", best.seconds},
-                         {"render_core_seconds", best.core_seconds},
-                         {"report", picture_report(picture)}};
+    Json record = {{"key", key},
+                   {"picture", json_of(seal_of_file(file(key + ".exr")))},
+                   {"program_version", kProgramVersion},
+                   {"processor", processor_},
+                   {"threads", working_threads()},
+                   {"render_seconds", best.seconds},
+                   {"render_core_seconds", best.core_seconds},
+                   {"report", picture_report(picture)}};
     write_sealed_json(file(key + ".json"), record);
     made_.insert(key);
     return record;

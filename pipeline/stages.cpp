@@ -211,8 +211,7 @@ bool is_sound(const Stage& stage, StageContext& context) {
 
 Artifact provide_artifact(const Stage& stage, const std::string& fabric, StageContext& context,
                           const std::function<void(const fs::path&, StageResult&)>& build) {
-  const Artifact artifact{stage.key,
-                          context.cache.artifact(stage.name, stage.key, stage.extension)};
+  Artifact artifact{stage.key, context.cache.artifact(stage.name, stage.key, stage.extension)};
   StageResult result{
       .fabric = fabric, .stage = stage.name, .key = stage.key, .artifact = artifact.path};
   if (!is_sound(stage, context)) {
@@ -430,7 +429,7 @@ void FabricStages::compute_maps(const Stage& stage, const fs::path& file, std::u
 
 Artifact FabricStages::maps() {
   const Stage stage = maps_stage();
-  const Artifact artifact = artifact_of(stage, [&](const fs::path& path, StageResult& result) {
+  Artifact artifact = artifact_of(stage, [&](const fs::path& path, StageResult& result) {
     const auto segments = static_cast<std::uint32_t>(exemplar().segment_count());
     // All maps, and two copies while they are written.
     const double map_bytes = document_.config.light_from_both_sides ? 2048 : 1024;
@@ -550,7 +549,7 @@ std::unique_ptr<FabricStages::TransferWork> FabricStages::transfer_work(
 Artifact FabricStages::transfer(std::optional<int> order) {
   const TransferSettings settings = transfer_settings(order);
   const Stage stage = transfer_stage(settings);
-  const Artifact artifact = artifact_of(stage, [&](const fs::path& path, StageResult& result) {
+  Artifact artifact = artifact_of(stage, [&](const fs::path& path, StageResult& result) {
     const auto work = transfer_work(settings);
     const std::uint32_t cells = work->baker->cell_count();
     // Matrices of all cells: chunks, what is assembled of them, and two copies while that is

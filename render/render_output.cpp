@@ -1,5 +1,7 @@
 #include "render/render_output.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 
@@ -73,7 +75,7 @@ std::vector<Rgb> layer_of(const Image& image, const std::string& layer, const st
     const std::string channel = channel_name(layer, kColorChannels[static_cast<std::size_t>(c)]);
     const auto found = image.channels.find(channel);
     if (found == image.channels.end() || found->second.type == ChannelType::kUint) {
-      throw FileError(name + ": no colour channel '" + channel + "'");
+      throw FileError(fmt::format("{}: no colour channel '{}'", name, channel));
     }
     for (std::size_t k = 0; k < colors.size(); ++k) colors[k][c] = found->second.values[k];
   }

@@ -94,7 +94,7 @@ ViewConfig read_view(const TomlTable& table, const SceneConfig& scene, int defau
 }
 
 std::string read_view_name(const TomlTable& table, const SceneConfig& scene) {
-  const std::string name = table.string("name");
+  std::string name = table.string("name");
   const auto is_plain = [](char c) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' ||
            c == '_';

@@ -130,17 +130,16 @@ float SingleScattering::visible_share(std::uint32_t segment, const Mat3& to_fabr
   }
   // The distance is taken as linear between three azimuths, and looked up at eight between them.
   using Lanes = Eigen::Array<float, 8, 1>;
-  static const Lanes kDeviations{-1.663F, -0.961F, -0.530F, -0.170F,
-                                 0.170F,  0.530F,  0.961F,  1.663F};
-  const float reach = kDeviations[7];
+  static const Lanes deviations{-1.663F, -0.961F, -0.530F, -0.170F, 0.170F, 0.530F, 0.961F, 1.663F};
+  const float reach = deviations[7];
   const float before = distance_at(-reach * deviation);
   const float after = distance_at(reach * deviation);
   float share = 0;
-  for (const float x : kDeviations) {
+  for (const float x : deviations) {
     const float distance = centre + std::abs(x) / reach * ((x < 0 ? before : after) - centre);
     share += share_within(distance, lobe.theta_precision);
   }
-  return share / static_cast<float>(kDeviations.size());
+  return share / static_cast<float>(deviations.size());
 }
 
 Rgb SingleScattering::scattered(const BcsdfTable& bcsdf, const Vec3& axis, float sharpness,

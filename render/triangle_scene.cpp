@@ -62,7 +62,7 @@ TriangleScene::TriangleScene(const std::vector<TriangleMesh>& meshes)
         rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
                                 sizeof(std::array<std::uint32_t, 3>), mesh.triangles.size());
     if (!mesh.positions.empty())
-      std::memcpy(vertices, mesh.positions.data(), mesh.positions.size() * sizeof(Vec3));
+      std::copy(mesh.positions.begin(), mesh.positions.end(), static_cast<Vec3*>(vertices));
     if (!mesh.triangles.empty()) {
       std::memcpy(indices, mesh.triangles.data(),
                   mesh.triangles.size() * sizeof(mesh.triangles[0]));

@@ -97,7 +97,7 @@ PackManifest read_manifest(const std::filesystem::path& folder) {
 }  // namespace
 
 void write_manifest(const std::filesystem::path& folder, PackManifest manifest) {
-  for (auto& [name, seal] : manifest.files) seal = seal_of_file(folder / name);
+  for (auto& file : manifest.files) file.second = seal_of_file(folder / file.first);
   write_file_atomically(folder / kManifestName, to_json(manifest).dump(2) + "\n");
 }
 

@@ -27,7 +27,7 @@ Weave parse_weave(std::string_view notation, WeaveFace face) {
   int b = 0;
   int ups = 0;  // warp-up crossings per pick, at the start of the pattern
   if (notation == "plain") {
-    a = b = ups = 1;
+    ups = 1;
     weave.ends = 2;
   } else if (notation.starts_with("twill ") && parse_pair(notation.substr(6), a, b)) {
     ups = a;

@@ -160,14 +160,14 @@ class LobeIntegrand {
 }  // namespace
 
 const ThreeNodeRule* cut_rules() {
-  static const auto kRules = [] {
+  static const auto all = [] {
     std::array<ThreeNodeRule, kCutRules> rules{};
     for (int k = 0; k < kCutRules; ++k) {
       rules[static_cast<std::size_t>(k)] = cut_gauss_hermite3(k * kCutReach / (kCutRules - 1));
     }
     return rules;
   }();
-  return kRules.data();
+  return all.data();
 }
 
 ThreeNodeRule cut_rule(double cut) {

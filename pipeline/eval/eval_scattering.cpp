@@ -11,7 +11,7 @@ nlohmann::json json_of(const Rgbd& color) {
 
 Rgbd read_color(EvalObject& object, const std::string& field) {
   const std::vector<double> v = object.numbers(field, 3);
-  const Rgbd color(v[0], v[1], v[2]);
+  Rgbd color(v[0], v[1], v[2]);
   if (color.minCoeff() < 0.0 || color.maxCoeff() > 1.0)
     object.fail(field, "must lie between 0 and 1");
   return color;

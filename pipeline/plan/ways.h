@@ -30,8 +30,8 @@ bool lacks_light_between(const WaySettings& way);
 /// Method, with "+ surfaces" where some cloth is drawn by a surface model.
 std::string family_of(const WaySettings& way);
 
-/// Ways of one kind share their errors, noise and speed up to what tables tell apart: what a pilot
-/// finds of one holds of all.
+/// Ways of one kind share their noise and speed up to what tables tell apart: what a pilot finds of
+/// one holds of all.
 std::string kind_of(const WaySettings& way);
 
 /// For people: method and what differs from the fabrics' own settings.

@@ -11,11 +11,14 @@ namespace {
 // 0, 1/16 .. 15/16 in a random order, as evenly distributed deviates of mean 0 and standard
 // deviation 1.
 std::array<double, WovenCotton::kVariants> shuffled_deviates(RandomStream& random) {
-  constexpr int n = WovenCotton::kVariants;
-  std::array<double, n> deviates;
-  const double scale = std::sqrt(12.0 / (1.0 - 1.0 / (n * n)));  // of n equally spaced values
-  for (int i = 0; i < n; ++i) deviates[static_cast<std::size_t>(i)] = scale * ((i + 0.5) / n - 0.5);
-  for (std::size_t i = n - 1; i > 0; --i) std::swap(deviates[i], deviates[random.index(i + 1)]);
+  constexpr int kCount = WovenCotton::kVariants;
+  std::array<double, kCount> deviates;
+  const double scale =
+      std::sqrt(12.0 / (1.0 - 1.0 / (kCount * kCount)));  // of as many equally spaced values
+  for (int i = 0; i < kCount; ++i)
+    deviates[static_cast<std::size_t>(i)] = scale * ((i + 0.5) / kCount - 0.5);
+  for (std::size_t i = kCount - 1; i > 0; --i)
+    std::swap(deviates[i], deviates[random.index(i + 1)]);
   return deviates;
 }
 
