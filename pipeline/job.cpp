@@ -17,10 +17,6 @@ Job::Job(const CommonOptions& options)
                .picture_seed = options.picture_seed,
                .results = {}} {}
 
-void Job::add_entry(const std::string& name, const nlohmann::ordered_json& value) {
-  entries_.emplace_back(name, value.dump());
-}
-
 void Job::finish() const {
   if (!json_) {
     for (const std::filesystem::path& path : artifacts_) std::cout << path.string() << '\n';
@@ -43,7 +39,7 @@ void Job::finish() const {
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
   nlohmann::ordered_json report = {
       {"stages", stages}, {"artifacts", artifacts}, {"seconds", seconds}};
-  for (const auto& [name, value] : entries_) report[name] = nlohmann::ordered_json::parse(value);
+  for (const auto& [name, value] : entries_) report[name] = value;
   std::cout << report.dump(2) << '\n';
 }
 

@@ -6,7 +6,7 @@
 
 #include <chrono>
 #include <filesystem>
-#include <nlohmann/json_fwd.hpp>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <utility>
 #include <vector>
@@ -25,7 +25,9 @@ class Job {
   StageContext& context() { return context_; }
   void add_artifact(const std::filesystem::path& path) { artifacts_.push_back(path); }
   /// One more entry of the JSON report.
-  void add_entry(const std::string& name, const nlohmann::ordered_json& value);
+  void add_entry(const std::string& name, nlohmann::ordered_json value) {
+    entries_.emplace_back(name, std::move(value));
+  }
   /// Prints the report.
   void finish() const;
 
@@ -35,7 +37,7 @@ class Job {
   Console console_;
   StageContext context_;
   std::vector<std::filesystem::path> artifacts_;
-  std::vector<std::pair<std::string, std::string>> entries_;  // name, JSON text
+  std::vector<std::pair<std::string, nlohmann::ordered_json>> entries_;
 };
 
 }  // namespace heddle

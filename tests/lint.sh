@@ -17,17 +17,25 @@ changed_since() {
     sort -u | while read -r file; do if [[ -f $file ]]; then echo "$file"; fi; done
 }
 
+# Compile commands without precompiled headers, which are in GCC's own form. Warnings stay warnings.
+configure() { env -u CI cmake --preset release -B "$1" -D CMAKE_DISABLE_PRECOMPILE_HEADERS=ON -D CMAKE_UNITY_BUILD="$2" >/dev/null; }
+
+# tidy FOLDER OPTION…: clang-tidy on the files that standard input names.
+tidy() {
+  xargs -P "$(nproc)" -n 1 clang-tidy-14 -p "$1" --quiet --warnings-as-errors='*' --extra-arg=-Wno-unknown-warning-option "${@:2}" \
+    2> >(grep -v 'warnings generated' >&2)
+}
+
 case ${1-} in
   "")
     echo "clang-format"
     sources | xargs clang-format-14 --dry-run --Werror
     exit ;;
   --all)
-    env -u CI cmake --preset release -B build/tidy-all -D CMAKE_DISABLE_PRECOMPILE_HEADERS=ON -D CMAKE_UNITY_BUILD=ON >/dev/null
+    configure build/tidy-all ON
     echo "clang-tidy on everything"
-    find build/tidy-all -name 'unity_*.cxx' | sort | xargs -P "$(nproc)" -n 1 clang-tidy-14 -p build/tidy-all --quiet --warnings-as-errors='*' \
-      --extra-arg=-Wno-unknown-warning-option --header-filter='/(formats|fibers|precompute|render|pipeline|tests)/' --checks=-bugprone-suspicious-include \
-      2> >(grep -v 'warnings generated' >&2)
+    find build/tidy-all -name 'unity_*.cxx' | sort |
+      tidy build/tidy-all --header-filter='/(formats|fibers|precompute|render|pipeline|tests)/' --checks=-bugprone-suspicious-include
     exit ;;
   --since)
     files=$(changed_since "$2")
@@ -40,8 +48,6 @@ case ${1-} in
 esac
 [[ -n $files ]] || exit 0
 
-# Compile commands of each file alone, without precompiled headers, which are in GCC's own form. Warnings stay warnings.
-env -u CI cmake --preset release -B build/tidy -D CMAKE_DISABLE_PRECOMPILE_HEADERS=ON -D CMAKE_UNITY_BUILD=OFF >/dev/null
+configure build/tidy OFF
 echo "clang-tidy on $(wc -l <<<"$files") files"
-xargs -P "$(nproc)" -n 1 clang-tidy-14 -p build/tidy --quiet --warnings-as-errors='*' --extra-arg=-Wno-unknown-warning-option \
-  <<<"$files" 2> >(grep -v 'warnings generated' >&2)
+tidy build/tidy <<<"$files"

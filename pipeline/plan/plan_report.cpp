@@ -162,7 +162,7 @@ std::string plan_text(const ScenePlan& plan) {
                         percent_text(root(way.candidate.bias_square.value)),
                         traces_paths(way.settings.method) && family_of(way.settings) == "path"
                             ? "none by definition"
-                        : way.tried ? "table and pilot"
+                        : way.pilot ? "table and pilot"
                                     : "table",
                         percent_text(root(way.candidate.noise_square.value / plan.offer->spp)));
     text += fmt::format(

@@ -48,8 +48,8 @@ bool Search::try_choice(std::size_t chosen) {
 
 /// Finds out more of a way that would be much cheaper than the chosen one if it erred by less than
 /// caution allows for: against the paths that there are, if that is useful and was not done yet,
-/// else against a larger pilot of paths. False where there is no such way, or finding
-/// out takes too long.
+/// else against a larger pilot of paths. False where there is no such way, or finding out takes too
+/// long.
 bool Search::try_cheaper(std::size_t chosen) {
   std::vector<Candidate> list = findings_->candidates();
   for (Candidate& candidate : list) candidate.bias_square = at_best(candidate.bias_square);
