@@ -37,7 +37,7 @@ constexpr std::uint32_t kCellsPerChunk = 32;
 // needs a new number: its key holds it, and what the old one made is then found no more.
 int version_of(std::string_view stage) {
   static const std::map<std::string_view, int> versions = {
-      {"geometry", 1},        {"synth", 1},    {"maps", 3}, {"ssdf", 1},     {"sg", 1},
+      {"geometry", 1},        {"synth", 2},    {"maps", 3}, {"ssdf", 1},     {"sg", 1},
       {"transfer", 4},        {"voxelize", 2}, {"pack", 1}, {"accuracy", 8}, {"surface-maps", 1},
       {"surface-weights", 2},
   };
@@ -92,6 +92,7 @@ std::string hash_of_geometry(const Exemplar& exemplar) {
                     {{"tile_mm", fmt::format("{} {}", exemplar.width_mm, exemplar.height_mm)},
                      {"first_point", bytes_of(exemplar.first_point)},
                      {"points", bytes_of(exemplar.points)},
+                     {"is_open", bytes_of(exemplar.is_open)},
                      {"radius_mm", bytes_of(exemplar.radius_mm)}}});
 }
 

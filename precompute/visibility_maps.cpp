@@ -108,6 +108,7 @@ class MapTracer {
     for (const int step : {1, -1}) {
       for (int piece = step > 0 ? hit_piece : hit_piece - 1; std::abs(piece - hit_piece) < pieces;
            piece += step) {
+        if (exemplar.is_open[fiber] != 0 && (piece < 0 || piece >= pieces)) break;
         const int turns = piece >= 0 ? piece / pieces : -((pieces - 1 - piece) / pieces);
         const auto point = first + static_cast<std::uint32_t>(piece - turns * pieces);
         const Vec3 shift = copy + static_cast<float>(turns) * period - origin_;

@@ -21,7 +21,8 @@ namespace {
 void validate_layout(const Exemplar& e, const std::string& name) {
   const std::size_t fibers = e.radius_mm.size();
   if (fibers == 0 || e.first_point.size() != fibers + 1 || e.material.size() != fibers ||
-      e.first_point[0] != 0 || e.first_point.back() != e.points.size()) {
+      e.yarn.size() > fibers || e.is_open.size() > fibers || e.first_point[0] != 0 ||
+      e.first_point.back() != e.points.size()) {
     broken(name, 1, "the fibers do not cover the points exactly");
   }
   for (std::size_t f = 0; f < fibers; ++f) {
@@ -94,6 +95,8 @@ constexpr std::size_t kScatteringNumbers = 10;
 }  // namespace
 
 void index_segments(Exemplar& e) {
+  e.yarn.resize(e.fiber_count(), 0);
+  e.is_open.resize(e.fiber_count(), 0);
   e.segment_point.clear();
   e.segment_fiber.clear();
   e.segment_point.reserve(e.points.size() - e.fiber_count());
@@ -119,8 +122,10 @@ void validate_exemplar(const Exemplar& e, const std::string& name) {
     const float r = e.radius_mm[f];
     const Vec3 period = e.points[e.first_point[f + 1] - 1] - e.points[e.first_point[f]];
     const float tolerance = 1e-5F * std::max(e.width_mm, e.height_mm);
-    if ((period - Vec3(e.width_mm, 0, 0)).norm() > tolerance &&
-        (period - Vec3(0, e.height_mm, 0)).norm() > tolerance) {
+    const Vec3 size = period.cwiseAbs();
+    const bool is_open = f < e.is_open.size() && e.is_open[f] != 0;
+    if (!is_open && (size - Vec3(e.width_mm, 0, 0)).norm() > tolerance &&
+        (size - Vec3(0, e.height_mm, 0)).norm() > tolerance) {
       broken(name, 3, fmt::format("fiber {} does not continue in the next tile", f));
     }
     for (std::uint32_t p = e.first_point[f]; p + 1 < e.first_point[f + 1]; ++p) {
@@ -156,6 +161,8 @@ void write_exemplar(const std::filesystem::path& path, const Exemplar& e,
   file.add<std::uint32_t>("first_point", {e.first_point.size()}, e.first_point);
   file.add<float>("radius_mm", {e.radius_mm.size()}, e.radius_mm);
   file.add<std::uint16_t>("material", {e.material.size()}, e.material);
+  file.add<std::uint32_t>("yarn", {e.yarn.size()}, e.yarn);
+  file.add<std::uint8_t>("is_open", {e.is_open.size()}, e.is_open);
   file.add<double>("scattering", {e.scattering.size(), kScatteringNumbers}, scattering);
   file.write(path);
 }
@@ -174,6 +181,8 @@ Exemplar read_exemplar(const std::filesystem::path& path) {
   e.first_point = file.get<std::uint32_t>("first_point", {0});
   e.radius_mm = file.get<float>("radius_mm", {0});
   e.material = file.get<std::uint16_t>("material", {0});
+  e.yarn = file.get<std::uint32_t>("yarn", {e.radius_mm.size()});
+  e.is_open = file.get<std::uint8_t>("is_open", {e.radius_mm.size()});
   const auto scattering = file.get<double>("scattering", {0, kScatteringNumbers});
   for (std::size_t i = 0; i < scattering.size(); i += kScatteringNumbers) {
     const double* v = scattering.data() + i;

@@ -84,14 +84,12 @@ double segments_per_fiber(const YarnConfig& yarn, double period_mm, double segme
   return std::max({4.0, std::ceil(period_mm / segment_mm), std::ceil(kPointsPerTurn * turns)});
 }
 
-void add_fibers_of_yarn(const YarnConfig& yarn, double fiber_radius_mm, const YarnPath& path,
+void add_fibers_of_yarn(const YarnConfig& yarn, double fiber_radius_mm, const CentreLine& line,
                         double segment_mm, std::uint64_t seed, std::uint32_t yarn_index,
                         Exemplar& exemplar) {
-  const double period = path.length_mm();
+  const double period = line.length_mm;
   const SnappedTwist twist = snap_twist(yarn, period);
   const PlyShape shape = ply_shape(yarn.plies);
-  const double half_width = 0.5 * yarn.width_mm - fiber_radius_mm;
-  const double half_height = 0.5 * yarn.height_mm - fiber_radius_mm;
   const int segments = static_cast<int>(segments_per_fiber(yarn, period, segment_mm));
   // A slope of s along each of the two cross axes tilts the fiber by atan(sqrt(2) s).
   const double slope_rms = std::tan(yarn.wander_rms) / std::sqrt(2.0);
@@ -129,6 +127,9 @@ void add_fibers_of_yarn(const YarnConfig& yarn, double fiber_radius_mm, const Ya
         const double squeeze =
             1 - 0.5 * yarn.migration *
                     (1 + std::cos(kTurn * migration_waves * share + migration_phase));
+        const YarnPlace place = line.at(static_cast<double>(k) / segments);
+        const double half_width = place.half_width_mm - fiber_radius_mm;
+        const double half_height = place.half_height_mm - fiber_radius_mm;
         const double ply_turn = kTurn * twist.ply_turns * share;
         const double u = squeeze * (u0 * std::cos(ply_turn) - v0 * std::sin(ply_turn));
         const double v = squeeze * (u0 * std::sin(ply_turn) + v0 * std::cos(ply_turn));
@@ -145,15 +146,13 @@ void add_fibers_of_yarn(const YarnConfig& yarn, double fiber_radius_mm, const Ya
           x /= outside;
           y /= outside;
         }
-        const double along = period * k / segments;
-        const double height = path.height_at(period * share) + y;
-        exemplar.points.push_back(path.is_warp
-                                      ? Vec3d(path.across_mm + x, along, height).cast<float>()
-                                      : Vec3d(along, path.across_mm + x, height).cast<float>());
+        exemplar.points.push_back((place.position + x * place.side + y * place.up).cast<float>());
       }
       exemplar.first_point.push_back(static_cast<std::uint32_t>(exemplar.points.size()));
       exemplar.radius_mm.push_back(static_cast<float>(fiber_radius_mm));
       exemplar.material.push_back(static_cast<std::uint16_t>(yarn.fiber));
+      exemplar.yarn.push_back(yarn_index);
+      exemplar.is_open.push_back(line.is_open ? 1 : 0);
     }
   }
 }

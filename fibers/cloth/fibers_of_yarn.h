@@ -2,15 +2,16 @@
 #define HEDDLE_FIBERS_CLOTH_FIBERS_OF_YARN_H_
 // Fibers of one yarn, after the procedural yarn model of Zhao, Luan, Bala 2016: plies twisted about
 // the yarn, fibers twisted about their ply, radial migration. A band-limited random wander of
-// stated rms angle is added. The yarn's cross-section is a unit disc. It is scaled to the flattened
-// ellipse of the yarn less one fiber radius, so no fiber leaves its yarn. Twists are snapped to
+// stated rms angle is added. The yarn's cross-section is a unit disc. It is scaled to the ellipse
+// of the centre line less one fiber radius, so no fiber leaves its yarn. Twists are snapped to
 // whole turns per tile, which makes every fiber periodic under its own id. Everything random comes
 // from (seed, yarn, fiber). Tested in tests/fibers/cloth/fibers_of_yarn_test.cpp.
 
 #include <cstdint>
 
+#include "fibers/cloth/centre_line.h"
 #include "fibers/cloth/exemplar.h"
-#include "fibers/cloth/yarn_paths.h"
+#include "fibers/cloth/yarn_config.h"
 
 namespace heddle {
 
@@ -25,8 +26,8 @@ SnappedTwist snap_twist(const YarnConfig& yarn, double period_mm);
 /// follow its twist.
 double segments_per_fiber(const YarnConfig& yarn, double period_mm, double segment_mm);
 
-/// Appends the fibers of one yarn to the exemplar (points, radius, material).
-void add_fibers_of_yarn(const YarnConfig& yarn, double fiber_radius_mm, const YarnPath& path,
+/// Appends the fibers of one yarn to the exemplar (points, radius, material, yarn).
+void add_fibers_of_yarn(const YarnConfig& yarn, double fiber_radius_mm, const CentreLine& line,
                         double segment_mm, std::uint64_t seed, std::uint32_t yarn_index,
                         Exemplar& exemplar);
 

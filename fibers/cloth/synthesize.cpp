@@ -27,8 +27,8 @@ ExemplarForecast forecast_exemplar(const FabricConfig& config) {
     return yarns * yarn.plies * yarn.fibers_per_ply *
            segments_per_fiber(yarn, period_mm, config.segment_mm);
   };
-  const double segments = segments_of(config.warp, ends, picks * config.weft.spacing_mm) +
-                          segments_of(config.weft, picks, ends * config.warp.spacing_mm);
+  const double segments = segments_of(config.warp_yarn(0), ends, picks * config.weft.spacing_mm) +
+                          segments_of(config.weft_yarn(0), picks, ends * config.warp.spacing_mm);
   return {segments, kPointBytesPerSegment * segments};
 }
 
@@ -52,17 +52,19 @@ Exemplar synthesize(const FabricConfig& config, const std::function<void()>& yar
   // fibers have a point more than segments
   exemplar.points.reserve(static_cast<std::size_t>(1.25 * forecast.segments));
   std::uint32_t yarn_index = 0;
-  auto add_system = [&](const YarnConfig& yarn, const std::vector<YarnPath>& system) {
+  const auto add_system = [&](const YarnConfig& yarn, const std::vector<YarnPath>& system) {
     for (const YarnPath& path : system) {
-      add_fibers_of_yarn(yarn, config.fibers[static_cast<std::size_t>(yarn.fiber)].radius_mm, path,
-                         config.segment_mm, config.seed, yarn_index++, exemplar);
+      add_fibers_of_yarn(yarn, config.fibers[static_cast<std::size_t>(yarn.fiber)].radius_mm,
+                         centre_line(path, yarn.width_mm, yarn.height_mm), config.segment_mm,
+                         config.seed, yarn_index++, exemplar);
       yarn_done();
     }
   };
-  add_system(config.warp, paths.warp);
-  add_system(config.weft, paths.weft);
-  // The last point of a fiber is its first, one period on, to the last bit.
+  add_system(config.warp_yarn(0), paths.warp);
+  add_system(config.weft_yarn(0), paths.weft);
+  // The last point of a fiber that goes on is its first, one period on, to the last bit.
   for (std::size_t f = 0; f < exemplar.fiber_count(); ++f) {
+    if (exemplar.is_open[f] != 0) continue;
     const Vec3& first = exemplar.points[exemplar.first_point[f]];
     Vec3& last = exemplar.points[exemplar.first_point[f + 1] - 1];
     const bool along_x = last.x() - first.x() > last.y() - first.y();

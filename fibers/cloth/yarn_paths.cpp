@@ -46,8 +46,8 @@ struct CrossingPoint {
 template <class F>
 void for_each_crossing_point(const FabricConfig& config, const YarnPaths& paths, int samples,
                              F&& f) {
-  const double a_warp = 0.5 * config.warp.width_mm;
-  const double a_weft = 0.5 * config.weft.width_mm;
+  const double a_warp = 0.5 * config.warp_yarn(0).width_mm;
+  const double a_weft = 0.5 * config.weft_yarn(0).width_mm;
   const auto over_crossing = [&](int end, int pick, unsigned kind) {
     const YarnPath& warp = paths.warp[static_cast<std::size_t>(end)];
     const YarnPath& weft = paths.weft[static_cast<std::size_t>(pick)];
@@ -59,8 +59,8 @@ void for_each_crossing_point(const FabricConfig& config, const YarnPaths& paths,
         f(CrossingPoint{
             kind, dx, dy,
             sign * (warp.height_at(weft.across_mm + dy) - weft.height_at(warp.across_mm + dx)),
-            0.5 * (config.warp.height_mm * section(dx, a_warp) +
-                   config.weft.height_mm * section(dy, a_weft))});
+            0.5 * (config.warp_yarn(0).height_mm * section(dx, a_warp) +
+                   config.weft_yarn(0).height_mm * section(dy, a_weft))});
       }
     }
   };
@@ -135,13 +135,27 @@ double YarnPath::height_at(double along_mm) const {
   return a + (b - a) * 0.5 * (1 - std::cos(kPi * (u - cell)));
 }
 
+CentreLine centre_line(const YarnPath& path, double width_mm, double height_mm) {
+  // side x up is the direction of the yarn.
+  const Vec3d along = path.is_warp ? Vec3d(0, 1, 0) : Vec3d(1, 0, 0);
+  const Vec3d across = path.is_warp ? Vec3d(1, 0, 0) : Vec3d(0, 1, 0);
+  const Vec3d side = path.is_warp ? Vec3d(-1, 0, 0) : across;
+  const double length = path.length_mm();
+  return {[=](double share) {
+            const Vec3d position = path.across_mm * across + share * length * along +
+                                   path.height_at(share * length) * Vec3d(0, 0, 1);
+            return YarnPlace{position, side, Vec3d(0, 0, 1), 0.5 * width_mm, 0.5 * height_mm};
+          },
+          length};
+}
+
 YarnPaths lay_yarns(const FabricConfig& config) {
   const int ends = config.weave.ends * config.repeats_x;
   const int picks = config.weave.picks * config.repeats_y;
   YarnPaths paths;
   paths.width_mm = ends * config.warp.spacing_mm;
   paths.height_mm = picks * config.weft.spacing_mm;
-  const double touching = 0.5 * (config.warp.height_mm + config.weft.height_mm);
+  const double touching = 0.5 * (config.warp_yarn(0).height_mm + config.weft_yarn(0).height_mm);
   for (int end = 0; end < ends; ++end) {
     YarnPath yarn{true, (end + 0.5) * config.warp.spacing_mm, config.weft.spacing_mm, picks, {}};
     for (int pick = 0; pick < config.weave.picks; ++pick) {

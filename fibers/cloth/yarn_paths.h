@@ -9,6 +9,7 @@
 
 #include <vector>
 
+#include "fibers/cloth/centre_line.h"
 #include "fibers/cloth/fabric_config.h"
 
 namespace heddle {
@@ -26,6 +27,9 @@ struct YarnPath {
   /// Height over the middle plane at a distance along the yarn (periodic).
   double height_at(double along_mm) const;
 };
+
+/// The path as a centre line with a section of this size. It stays upright: slopes shear it.
+CentreLine centre_line(const YarnPath& path, double width_mm, double height_mm);
 
 struct YarnPaths {
   double width_mm = 0;

@@ -197,12 +197,12 @@ TEST(BundleTangentsAgreement, SparseYarnsOnALargeTile) {
   config.weave = parse_weave("plain", WeaveFace::kWarp);
   config.repeats_x = config.repeats_y = 8;
   config.fibers[0].radius_mm = 0.005;
-  for (YarnConfig* yarn : {&config.warp, &config.weft}) {
-    yarn->spacing_mm = 81.921;
-    yarn->width_mm = yarn->height_mm = 10;
-    yarn->plies = 1;
-    yarn->fibers_per_ply = 1;
-    yarn->yarn_turns_per_mm = yarn->ply_turns_per_mm = 0;
+  config.warp.spacing_mm = config.weft.spacing_mm = 81.921;
+  for (YarnConfig& yarn : config.yarns) {
+    yarn.width_mm = yarn.height_mm = 10;
+    yarn.plies = 1;
+    yarn.fibers_per_ply = 1;
+    yarn.yarn_turns_per_mm = yarn.ply_turns_per_mm = 0;
   }
   const Exemplar exemplar = synthesize(config);
   ASSERT_GT(exemplar.width_mm, 1300);

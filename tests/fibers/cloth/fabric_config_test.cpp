@@ -19,8 +19,8 @@ TEST(FabricConfig, ReadsUnitsIntoMillimetresAndRadians) {
   EXPECT_EQ(config.weave.ends, 4);
   EXPECT_DOUBLE_EQ(config.fibers[0].radius_mm, 0.014);
   EXPECT_DOUBLE_EQ(config.fibers[0].scattering.beta_tt, radians(10));
-  EXPECT_DOUBLE_EQ(config.warp.ply_turns_per_mm, -2);
-  EXPECT_DOUBLE_EQ(config.weft.wander_rms, radians(4));
+  EXPECT_DOUBLE_EQ(config.yarns[0].ply_turns_per_mm, -2);
+  EXPECT_DOUBLE_EQ(config.yarns[1].wander_rms, radians(4));
 }
 
 TEST(FabricConfig, EachClassOfErrorNamesPlaceAndExpectation) {

@@ -4,19 +4,19 @@
 
 #include <cmath>
 
+#include "fibers/cloth/yarn_paths.h"
 #include "tests/support/fabrics.h"
 #include "tests/support/fibers.h"
 
 namespace heddle {
 namespace {
 
-YarnPath flat_yarn(double length_mm) {
-  return {false, 0.5, length_mm / 4, 4, {0, 0, 0, 0}};
+CentreLine flat_yarn(const YarnConfig& yarn, double length_mm, bool is_warp) {
+  return centre_line({is_warp, 0.5, length_mm / 4, 4, {0, 0, 0, 0}}, yarn.width_mm, yarn.height_mm);
 }
 
 YarnConfig yarn_of(int plies, int fibers, double wander_deg) {
   YarnConfig yarn;
-  yarn.spacing_mm = 1;
   yarn.width_mm = 0.4;
   yarn.height_mm = 0.2;
   yarn.plies = plies;
@@ -26,13 +26,14 @@ YarnConfig yarn_of(int plies, int fibers, double wander_deg) {
 }
 
 Exemplar fibers_of(const YarnConfig& yarn, double length_mm, double segment_mm,
-                   std::uint64_t seed = 1) {
+                   std::uint64_t seed = 1, bool is_warp = false) {
   Exemplar exemplar;
-  exemplar.width_mm = static_cast<float>(length_mm);
-  exemplar.height_mm = 1;
+  exemplar.width_mm = exemplar.height_mm = 1;
+  (is_warp ? exemplar.height_mm : exemplar.width_mm) = static_cast<float>(length_mm);
   exemplar.first_point = {0};
   exemplar.scattering = {test::white_fiber()};
-  add_fibers_of_yarn(yarn, 0.005, flat_yarn(length_mm), segment_mm, seed, 0, exemplar);
+  add_fibers_of_yarn(yarn, 0.005, flat_yarn(yarn, length_mm, is_warp), segment_mm, seed, 0,
+                     exemplar);
   index_segments(exemplar);
   return exemplar;
 }
@@ -82,16 +83,22 @@ TEST(FibersOfYarnLaw, TwistGivesTheAngleOfAHelix) {
 // whichever way the axis is followed. A ply without turns of its own is turned by its yarn alone;
 // its axis is the yarn's.
 TEST(FibersOfYarnLaw, PositiveTwistIsZ) {
-  for (const double turns : {1.5, -1.5}) {
-    for (const bool of_the_ply : {false, true}) {
-      YarnConfig yarn = yarn_of(of_the_ply ? 1 : 3, 12, 0);
-      (of_the_ply ? yarn.ply_turns_per_mm : yarn.yarn_turns_per_mm) = turns;
-      const Exemplar exemplar = fibers_of(yarn, 2, 0.01);
-      ASSERT_GT(exemplar.segment_count(), 1000U);
-      for (std::uint32_t s = 0; s < exemplar.segment_count(); ++s) {
-        const Vec3 beside = exemplar.segment_midpoint(s) - Vec3(0, 0.5F, 0);
-        const float hand = beside.cross(exemplar.segment_tangent(s)).x();
-        ASSERT_GT(hand * static_cast<float>(turns), 0) << s << (of_the_ply ? ", ply" : ", yarn");
+  for (const bool is_warp : {false, true}) {
+    const int along = is_warp ? 1 : 0;
+    for (const double turns : {1.5, -1.5}) {
+      for (const bool of_the_ply : {false, true}) {
+        YarnConfig yarn = yarn_of(of_the_ply ? 1 : 3, 12, 0);
+        (of_the_ply ? yarn.ply_turns_per_mm : yarn.yarn_turns_per_mm) = turns;
+        const Exemplar exemplar = fibers_of(yarn, 2, 0.01, 1, is_warp);
+        ASSERT_GT(exemplar.segment_count(), 1000U);
+        for (std::uint32_t s = 0; s < exemplar.segment_count(); ++s) {
+          Vec3 beside = exemplar.segment_midpoint(s);
+          beside[1 - along] -= 0.5F;
+          beside[along] = 0;
+          const float hand = beside.cross(exemplar.segment_tangent(s))[along];
+          ASSERT_GT(hand * static_cast<float>(turns), 0)
+              << s << (is_warp ? ", warp" : ", weft") << (of_the_ply ? ", ply" : ", yarn");
+        }
       }
     }
   }

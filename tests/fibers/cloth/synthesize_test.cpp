@@ -30,7 +30,7 @@ TEST(SynthesizeLaw, TheForecastCountsTheSegments) {
   for (const char* notation : {"plain", "twill 3/1", "satin 5/2"}) {
     FabricConfig config = test::small_fabric(notation);
     config.repeats_x = 3;
-    config.warp.fibers_per_ply = 5;
+    config.yarns[0].fibers_per_ply = 5;
     EXPECT_EQ(forecast_exemplar(config).segments,
               static_cast<double>(synthesize(config).segment_count()))
         << notation;
@@ -40,7 +40,7 @@ TEST(SynthesizeLaw, TheForecastCountsTheSegments) {
 TEST(SynthesizeLaw, TilesBeyondTheIndicesAreRefused) {
   FabricConfig config = test::small_fabric();
   config.repeats_x = config.repeats_y = 64;
-  config.warp.fibers_per_ply = config.weft.fibers_per_ply = 1'000'000;
+  config.yarns[0].fibers_per_ply = config.yarns[1].fibers_per_ply = 1'000'000;
   EXPECT_THROW(synthesize(config), std::invalid_argument);
 }
 

@@ -16,7 +16,7 @@ TEST(YarnPathsLaw, NoTwoYarnsOverlapAndTheTightestTouch) {
     // A grid finer than and incommensurate with the one that solved for the crests.
     const double clearance = smallest_clearance(config, paths, 151);
     EXPECT_GE(clearance, 0) << notation;
-    EXPECT_LT(clearance, 0.01 * config.warp.height_mm)
+    EXPECT_LT(clearance, 0.01 * config.yarns[0].height_mm)
         << notation << ": the crests are taller than they need to be";
   }
 }
@@ -102,8 +102,8 @@ TEST(YarnPathsLaw, HeightIsPeriodicAndSmooth) {
 
 TEST(YarnPaths, YarnsTooWideToPassAreRefused) {
   FabricConfig config = test::small_fabric();
-  config.warp.width_mm = config.warp.spacing_mm;
-  config.weft.width_mm = config.weft.spacing_mm;
+  config.yarns[0].width_mm = config.warp.spacing_mm;
+  config.yarns[1].width_mm = config.weft.spacing_mm;
   EXPECT_THROW(lay_yarns(config), std::invalid_argument);
 }
 

@@ -1,0 +1,48 @@
+#ifndef HEDDLE_FIBERS_CLOTH_YARN_CONFIG_H_
+#define HEDDLE_FIBERS_CLOTH_YARN_CONFIG_H_
+// What a fabric TOML says about fibers and yarns. Keys, units and ranges: configs/README.md.
+// Lengths in millimetres, angles in radians after parsing. Tested in
+// tests/fibers/cloth/yarn_config_test.cpp.
+
+#include <string>
+#include <vector>
+
+#include "fibers/scattering/fiber_bcsdf.h"
+#include "formats/toml_table.h"
+
+namespace heddle {
+
+/// A fiber type: its thickness and how it scatters.
+struct FiberType {
+  std::string name;
+  double radius_mm = 0;
+  FiberScattering scattering;
+};
+
+/// One yarn: its fibers and how they lie in it.
+struct YarnConfig {
+  std::string name;
+  int fiber = 0;         // index into FabricConfig::fibers
+  double width_mm = 0;   // full width of the flattened yarn in the plane of the cloth
+  double height_mm = 0;  // full height of the flattened yarn
+  int plies = 1;
+  int fibers_per_ply = 1;
+  // twist of the plies about the yarn, positive = Z; snapped to whole turns per tile
+  double yarn_turns_per_mm = 0;
+  double ply_turns_per_mm = 0;  // twist of the fibers about their ply, likewise
+  // relative depth of radial migration, 0 .. 1 (Zhao et al. 2016: 1 - rho_min)
+  double migration = 0;
+  // rms angle (radians) of irregular fiber wander against the ideal helix
+  double wander_rms = 0;
+};
+
+/// Reads a table [fiber.NAME].
+FiberType read_fiber(const TomlTable& table, const std::string& name);
+
+/// Reads the keys of one yarn from a table [yarn.NAME], [warp] or [weft].
+YarnConfig read_yarn(const TomlTable& table, const std::string& name,
+                     const std::vector<FiberType>& fibers);
+
+}  // namespace heddle
+
+#endif  // HEDDLE_FIBERS_CLOTH_YARN_CONFIG_H_
