@@ -4,9 +4,12 @@
 // Lengths in millimetres, angles in radians after parsing. Tested in
 // tests/fibers/cloth/yarn_config_test.cpp.
 
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "fibers/cloth/flyaways.h"
+#include "fibers/cloth/yarn_section.h"
 #include "fibers/scattering/fiber_bcsdf.h"
 #include "formats/toml_table.h"
 
@@ -32,14 +35,31 @@ struct YarnConfig {
   double ply_turns_per_mm = 0;  // twist of the fibers about their ply, likewise
   // relative depth of radial migration, 0 .. 1 (Zhao et al. 2016: 1 - rho_min)
   double migration = 0;
+  // waves of migration per turn of a fiber about its ply; snapped to whole waves per tile, at least
+  // one
+  double migration_per_turn = 1;
   // rms angle (radians) of irregular fiber wander against the ideal helix
   double wander_rms = 0;
+  // Ellipses of the plies of the round yarn, in mm, of the fibers' axes. Without it plies are
+  // circles that fill the section.
+  std::optional<PlyShape> ply_mm;
+  RadialDensity density;
+  Hairs hairs;
+  Loops loops;
+  std::vector<Slubs> slubs;
+  Neps neps;
+  std::string file_text;  // canonical text of the file named by `from`; empty without one
+
+  /// Radius (mm) of the round yarn, up to the axes of its outermost fibers. Woven, its section is
+  /// flattened to width_mm x height_mm; flyaways keep their lengths.
+  double round_radius_mm(double fiber_radius_mm) const;
 };
 
 /// Reads a table [fiber.NAME].
 FiberType read_fiber(const TomlTable& table, const std::string& name);
 
 /// Reads the keys of one yarn from a table [yarn.NAME], [warp] or [weft].
+/// They may stand in a file of their own, named by `from`.
 YarnConfig read_yarn(const TomlTable& table, const std::string& name,
                      const std::vector<FiberType>& fibers);
 
