@@ -15,6 +15,7 @@
 #include "formats/atomic_file.h"
 #include "formats/content_hash.h"
 #include "formats/input_error.h"
+#include "formats/srgb_color.h"
 
 namespace heddle {
 
@@ -711,20 +712,47 @@ std::vector<double> TomlTable::numbers(std::string_view key, NumberRange range,
   return result;
 }
 
-std::vector<std::string> TomlTable::strings(std::string_view key, std::size_t max_count) const {
-  node_->record(key, "string[]", "", "optional");
+std::vector<std::string> TomlTable::strings(std::string_view key, std::size_t min_count,
+                                            std::size_t max_count) const {
+  const std::string expected = fmt::format("an array of {} to {} strings", min_count, max_count);
+  node_->record(key, "string[]", "", "required");
   const toml::node* value = node_->find(key);
-  if (value == nullptr) return {};
+  if (value == nullptr) document_->fail_missing(*node_, key, expected);
   const toml::array* array = value->as_array();
-  if (array == nullptr || array->size() > max_count)
-    document_->fail_wrong_value(key, *value,
-                                fmt::format("an array of up to {} strings", max_count));
+  if (array == nullptr || array->size() < min_count || array->size() > max_count)
+    document_->fail_wrong_value(key, *value, expected);
   std::vector<std::string> result;
   for (const toml::node& element : *array) {
     const auto* text = element.as_string();
     if (text == nullptr) document_->fail_wrong_value(key, element, "a string");
     result.push_back(text->get());
   }
+  return result;
+}
+
+std::vector<std::string> TomlTable::optional_strings(std::string_view key, std::size_t min_count,
+                                                     std::size_t max_count) const {
+  std::vector<std::string> result;
+  if (has(key)) result = strings(key, min_count, max_count);
+  node_->record(key, "string[]", "", "optional");
+  return result;
+}
+
+std::array<double, 3> TomlTable::color(std::string_view key) const {
+  const std::string expected = "a colour: 3 numbers in [0, 1], or \"#rrggbb\"";
+  node_->record(key, "color", "", "required");
+  const toml::node* value = node_->find(key);
+  if (value == nullptr) document_->fail_missing(*node_, key, expected);
+  std::array<double, 3> result{};
+  if (const auto* text = value->as_string()) {
+    const std::optional<std::array<double, 3>> color = color_of_hex(text->get());
+    if (!color) document_->fail_wrong_value(key, *value, expected);
+    return *color;
+  }
+  const toml::array* array = value->as_array();
+  if (array == nullptr || array->size() != 3) document_->fail_wrong_value(key, *value, expected);
+  for (std::size_t i = 0; i < 3; ++i)
+    result[i] = document_->checked_number(key, (*array)[i], {.min = 0, .max = 1});
   return result;
 }
 

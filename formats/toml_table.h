@@ -31,7 +31,7 @@ struct AskedKey {
   std::string
       // dotted; arrays of tables as "light[].axis"; tables listed by table_names() as "fiber.NAME"
       path;
-  // number, integer, boolean, string, file, number[2], number[3], number[], string[], table,
+  // number, integer, boolean, string, file, number[2], number[3], number[], string[], color, table,
   std::string type;
   // table[]
   std::string range;          // "" if none; strings with a fixed set of choices: "face | both"
@@ -69,8 +69,14 @@ class TomlTable {
   /// A required array of `min_count` to `max_count` numbers, each in the range.
   std::vector<double> numbers(std::string_view key, NumberRange range, std::size_t min_count,
                               std::size_t max_count) const;
-  /// An array of at most `max_count` strings; empty where the key is absent.
-  std::vector<std::string> strings(std::string_view key, std::size_t max_count) const;
+  /// A required array of `min_count` to `max_count` strings.
+  std::vector<std::string> strings(std::string_view key, std::size_t min_count,
+                                   std::size_t max_count) const;
+  /// The same; empty where the key is absent.
+  std::vector<std::string> optional_strings(std::string_view key, std::size_t min_count,
+                                            std::size_t max_count) const;
+  /// Linear rgb: an array of 3 numbers in [0, 1], or a string "#rrggbb", which is sRGB.
+  std::array<double, 3> color(std::string_view key) const;
   /// A string taken as a path relative to the folder of the document. The file must exist.
   std::filesystem::path existing_file(std::string_view key) const;
   /// The same for a file whose content belongs to the config: canonical_text() then holds a hash of

@@ -3,10 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <set>
 #include <stdexcept>
 #include <string_view>
+
+#include "formats/srgb_color.h"
 
 namespace heddle {
 namespace {
@@ -35,16 +36,11 @@ Weave read_notation(const TomlTable& weave) {
   }
 }
 
-float linear_of_srgb(double value) {
-  return static_cast<float>(value <= 0.04045 ? value / 12.92
-                                             : std::pow((value + 0.055) / 1.055, 2.4));
-}
-
 DraftThreads threads_of_draft(const WifThreads& from) {
   DraftThreads threads;
   for (const auto& color : from.color) {
-    threads.color.push_back(
-        {linear_of_srgb(color[0]), linear_of_srgb(color[1]), linear_of_srgb(color[2])});
+    std::array<float, 3>& linear = threads.color.emplace_back();
+    for (std::size_t c = 0; c < 3; ++c) linear[c] = static_cast<float>(linear_of_srgb(color[c]));
   }
   threads.spacing_mm = from.spacing_mm;
   threads.thickness_mm = from.thickness_mm;
@@ -143,8 +139,8 @@ Weave read_weave(const TomlTable& weave) {
       const std::filesystem::path path = weave.content_file("draft");
       return weave_of_draft(read_wif(path, rising), path.filename().string());
     }
-    const PaperColors colors = {weave.strings("warp_colors", kMaxPaperColors),
-                                weave.strings("weft_colors", kMaxPaperColors)};
+    const PaperColors colors = {weave.optional_strings("warp_colors", 1, kMaxPaperColors),
+                                weave.optional_strings("weft_colors", 1, kMaxPaperColors)};
     const std::filesystem::path path = weave.content_file("picture");
     return weave_of_paper(read_png(path, kMaxWeaveExtent), colors, path.filename().string());
   } catch (const std::invalid_argument& error) {

@@ -68,6 +68,22 @@ TEST(TomlTableTest, ReadsArraysOfAnyLengthInARange) {
   EXPECT_THROW(t.numbers("d", {}, 0, 4), ConfigError);
 }
 
+TEST(TomlTable, ReadsStringsAndColours) {
+  const TomlTable t = parse(
+      "a = [\"x\", \"y z\"]\nb = [\"x\", 1]\nc = [0.25, 1, 0]\n"
+      "d = \"#ff0080\"\ne = \"#ff008\"\nf = \"#ff00g0\"\ng = [0, 0, 2]");
+  EXPECT_EQ(t.strings("a", 1, 2), (std::vector<std::string>{"x", "y z"}));
+  EXPECT_THROW(t.strings("a", 3, 4), ConfigError);
+  EXPECT_THROW(t.strings("b", 1, 2), ConfigError);
+  EXPECT_EQ(t.color("c"), (std::array<double, 3>{0.25, 1, 0}));
+  // 0x80 / 255 = 0.50196 of sRGB is 0.21586 of linear light.
+  const std::array<double, 3> hex = t.color("d");
+  EXPECT_EQ(hex[0], 1);
+  EXPECT_EQ(hex[1], 0);
+  EXPECT_NEAR(hex[2], 0.21586, 1e-5);
+  for (const char* key : {"e", "f", "g"}) EXPECT_THROW(t.color(key), ConfigError) << key;
+}
+
 TEST(TomlTableTest, AbsentKeysGiveFallbacks) {
   const TomlTable t = parse("");
   EXPECT_EQ(t.integer("i", -5, 5, 2), 2);
