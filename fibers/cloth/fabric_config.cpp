@@ -3,9 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <stdexcept>
 
 #include "fibers/cloth/exemplar.h"
+#include "fibers/cloth/weave_config.h"
 
 namespace heddle {
 namespace {
@@ -40,16 +40,7 @@ FabricConfig read_fabric_config(const TomlTable& document) {
   config.segment_mm = kMmPerUm * document.number("segment_um", {.min = 1, .max = 10000});
 
   const TomlTable weave = document.table("weave");
-  const std::string notation = weave.string("notation");
-  WeaveFace face = WeaveFace::kWarp;
-  if (notation.starts_with("satin")) {
-    face = weave.choice("face", {"warp", "weft"}) == "warp" ? WeaveFace::kWarp : WeaveFace::kWeft;
-  }
-  try {
-    config.weave = parse_weave(notation, face);
-  } catch (const std::invalid_argument& error) {
-    weave.fail("notation", error.what());
-  }
+  config.weave = read_weave(weave);
   config.repeats_x = static_cast<int>(weave.integer("repeats_x", 1, 64));
   config.repeats_y = static_cast<int>(weave.integer("repeats_y", 1, 64));
   config.crimp_warp = weave.number("crimp_warp", {.min = 0, .max = 1});
