@@ -28,9 +28,8 @@ ExemplarForecast forecast_exemplar(const FabricConfig& config) {
     // Whole sequences fill the tile.
     for (const int k : system.sequence) {
       const YarnConfig& yarn = config.yarns[static_cast<std::size_t>(k)];
-      forecast.segments += yarns / static_cast<double>(system.sequence.size()) * yarn.plies *
-                           yarn.fibers_per_ply *
-                           segments_per_fiber(yarn, period_mm, config.segment_mm);
+      forecast.segments += yarns / static_cast<double>(system.sequence.size()) *
+                           segments_of_yarn(yarn, period_mm, config.segment_mm);
     }
     forecast.yarns += static_cast<std::uint64_t>(yarns);
   };
@@ -92,6 +91,7 @@ ExemplarSummary summarize(const Exemplar& exemplar) {
   const double area = static_cast<double>(exemplar.width_mm) * exemplar.height_mm;
   double length = 0;
   double volume = 0;
+  double length_going_on = 0;
   double squared_angle = 0;
   for (std::uint32_t s = 0; s < exemplar.segment_count(); ++s) {
     const std::uint32_t p = exemplar.segment_point[s];
@@ -101,16 +101,18 @@ ExemplarSummary summarize(const Exemplar& exemplar) {
     const double r = exemplar.radius_mm[f];
     const Vec3 period =
         exemplar.points[exemplar.first_point[f + 1] - 1] - exemplar.points[exemplar.first_point[f]];
-    const double in_plane =
-        period.x() > period.y() ? std::atan2(d.y(), d.x()) : std::atan2(d.x(), d.y());
     length += l;
     volume += l * kPi * r * r;
+    if (exemplar.is_open[f] != 0) continue;
+    const double in_plane =
+        period.x() > period.y() ? std::atan2(d.y(), d.x()) : std::atan2(d.x(), d.y());
+    length_going_on += l;
     squared_angle += l * in_plane * in_plane;
   }
   summary.mean_segment_mm = length / static_cast<double>(summary.segments);
   summary.areal_fiber_length_per_mm2 = length / area;
   summary.volume_fraction = volume / (area * summary.thickness_mm);
-  summary.wander_rms_deg = degrees(std::sqrt(squared_angle / length));
+  summary.wander_rms_deg = degrees(std::sqrt(squared_angle / std::max(length_going_on, 1e-9)));
   return summary;
 }
 
