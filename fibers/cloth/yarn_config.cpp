@@ -1,6 +1,7 @@
 #include "fibers/cloth/yarn_config.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "fibers/cloth/yarn_file.h"
 
@@ -32,6 +33,11 @@ FiberType read_fiber(const TomlTable& table, const std::string& name) {
   fiber.scattering.beta_tt = radians(table.number("beta_tt_deg", width));
   fiber.scattering.gamma_tt = radians(table.number("gamma_tt_deg", {.min = 1, .max = 180}));
   return fiber;
+}
+
+double YarnConfig::round_radius_mm(double fiber_radius_mm) const {
+  if (ply_mm) return reach_of(*ply_mm);
+  return std::sqrt((0.5 * width_mm - fiber_radius_mm) * (0.5 * height_mm - fiber_radius_mm));
 }
 
 YarnConfig read_yarn(const TomlTable& table, const std::string& name,

@@ -48,7 +48,6 @@ struct YarnConfig {
   Loops loops;
   std::vector<Slubs> slubs;
   Neps neps;
-  std::string file_text;  // canonical text of the file named by `from`; empty without one
 
   /// Radius (mm) of the round yarn, up to the axes of its outermost fibers. Woven, its section is
   /// flattened to width_mm x height_mm; flyaways keep their lengths.
