@@ -72,33 +72,40 @@ void close_periods(Exemplar& exemplar) {
 }  // namespace
 
 ExemplarForecast forecast_exemplar(const FabricConfig& config) {
-  double segments = 0;
+  ExemplarForecast forecast;
+  const auto add_yarn = [&](const YarnConfig& yarn, double length_mm) {
+    forecast.segments += segments_of_yarn(yarn, length_mm, config.segment_mm);
+    ++forecast.yarns;
+  };
   double area = 0;
   if (config.knit) {
     const KnitConfig& knit = *config.knit;
     area = knit.width_mm() * knit.height_mm();
-    const double length = knit.wales * usual_loop_length(knit);
     for (int course = 0; course < knit.courses; ++course)
-      segments += segments_of_yarn(config.yarn(knit.yarn_of(course)), length, config.segment_mm);
+      add_yarn(config.yarn(knit.yarn_of(course)), knit.wales * usual_loop_length(knit));
   } else if (config.curves) {
     area = config.curves->size_mm[0] * config.curves->size_mm[1];
     for (const TileCurve& curve : curves_on_tile(*config.curves, config.segment_mm, nullptr)) {
-      segments += config.curves->as_yarns
-                      ? segments_of_yarn(config.yarn(config.curves->yarn_of(curve.curve)),
-                                         length_of(curve), config.segment_mm)
-                      : static_cast<double>(curve.points.size() - 1);
+      if (config.curves->as_yarns) {
+        add_yarn(config.yarn(config.curves->yarn_of(curve.curve)), length_of(curve));
+      } else {
+        forecast.segments += static_cast<double>(curve.points.size() - 1);
+      }
     }
   } else {
-    const double ends = static_cast<double>(config.weave.ends) * config.repeats_x;
-    const double picks = static_cast<double>(config.weave.picks) * config.repeats_y;
-    const double width = ends * config.warp.spacing_mm;
-    const double height = picks * config.weft.spacing_mm;
+    const double width = warp_places(config).period_mm;
+    const double height = weft_places(config).period_mm;
     area = width * height;
-    segments = ends * segments_of_yarn(config.warp_yarn(0), height, config.segment_mm) +
-               picks * segments_of_yarn(config.weft_yarn(0), width, config.segment_mm);
+    // Whole sequences fill the tile.
+    const auto add_system = [&](const ThreadSystem& system, int count, double period_mm) {
+      for (int k = 0; k < count; ++k) add_yarn(config.yarn(system.yarn_at(k)), period_mm);
+    };
+    add_system(config.warp, config.weave.ends * config.repeats_x, height);
+    add_system(config.weft, config.weave.picks * config.repeats_y, width);
   }
-  if (config.pile) segments += segments_of_pile(*config.pile, area, config.segment_mm);
-  return {segments, kPointBytesPerSegment * segments};
+  if (config.pile) forecast.segments += segments_of_pile(*config.pile, area, config.segment_mm);
+  forecast.bytes = kPointBytesPerSegment * forecast.segments;
+  return forecast;
 }
 
 Exemplar synthesize(const FabricConfig& config, const std::function<void()>& yarn_done) {
@@ -131,12 +138,12 @@ Exemplar synthesize(const FabricConfig& config, const std::function<void()>& yar
     const YarnPaths paths = lay_yarns(config);
     exemplar.width_mm = static_cast<float>(paths.width_mm);
     exemplar.height_mm = static_cast<float>(paths.height_mm);
-    const auto add_system = [&](const YarnConfig& yarn, const std::vector<YarnPath>& system) {
-      for (const YarnPath& path : system)
-        add_yarn(yarn, centre_line(path, yarn.width_mm, yarn.height_mm));
+    const auto add_system = [&](const ThreadSystem& system, const std::vector<YarnPath>& lines) {
+      for (std::size_t k = 0; k < lines.size(); ++k)
+        add_yarn(config.yarn(system.yarn_at(static_cast<int>(k))), centre_line(lines[k]));
     };
-    add_system(config.warp_yarn(0), paths.warp);
-    add_system(config.weft_yarn(0), paths.weft);
+    add_system(config.warp, paths.warp);
+    add_system(config.weft, paths.weft);
   }
   close_periods(exemplar);
   if (config.pile) {
