@@ -76,8 +76,6 @@ void describe_threads(const FabricConfig& config, const YarnPaths& paths, Report
   report["cover_factor"] = rounded(warp.cover + weft.cover - warp.cover * weft.cover);
   if (warp.grams_per_m2 + weft.grams_per_m2 > 0)
     report["grams_per_m2"] = rounded(warp.grams_per_m2 + weft.grams_per_m2);
-  for (const YarnConfig& yarn : config.yarns)
-    report["yarns"][yarn.name] = yarn_report(yarn, config);
 }
 
 }  // namespace
@@ -111,12 +109,20 @@ void describe_exemplar(const Exemplar& exemplar, std::uint64_t seed, Report& rep
 
 Report fabric_report(const FabricDocument& fabric) {
   const FabricConfig& config = fabric.config;
-  Report report = {
-      {"kind", "fabric config"}, {"name", config.name}, {"weave", config.weave.notation}};
+  Report report = {{"kind", "fabric config"}, {"name", config.name}};
   report["light_from"] = config.light_from_both_sides ? "both" : "face";
   report["seed"] = config.seed;
   try {
-    describe_threads(config, lay_yarns(config), report);
+    if (config.knit) {
+      report["structure"] = "knit";
+    } else if (config.curves) {
+      report["structure"] = "curves";
+    } else {
+      report["weave"] = config.weave.notation;
+      describe_threads(config, lay_yarns(config), report);
+    }
+    for (const YarnConfig& yarn : config.yarns)
+      report["yarns"][yarn.name] = yarn_report(yarn, config);
     describe_exemplar(synthesize(config), config.seed, report);
   } catch (const std::invalid_argument& error) {
     throw ConfigError(fmt::format("{}: {}", fabric.file.string(), error.what()));

@@ -169,9 +169,6 @@ FabricDocument read_fabric_document(const fs::path& path, std::optional<std::uin
   cloth.erase("name");
   cloth.erase("light_from");
   cloth["seed"] = fabric.config.seed;
-  for (const YarnConfig& yarn : fabric.config.yarns) {
-    if (!yarn.file_text.empty()) cloth["files"][yarn.name] = nlohmann::json::parse(yarn.file_text);
-  }
   fabric.cloth_text = cloth.dump();
   return fabric;
 }

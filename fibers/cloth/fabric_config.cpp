@@ -158,6 +158,37 @@ ThreadSystem read_system(const TomlTable& document, const SystemKeys& keys, Fabr
   return system;
 }
 
+void read_woven(const TomlTable& document, FabricConfig& config) {
+  const TomlTable weave = document.table("weave");
+  config.weave = read_weave(weave);
+  config.repeats_x = static_cast<int>(weave.integer("repeats_x", 1, 64));
+  config.repeats_y = static_cast<int>(weave.integer("repeats_y", 1, 64));
+  config.crimp_warp = weave.number("crimp_warp", {.min = 0, .max = 1}, 0.5);
+  config.warp =
+      read_system(document, {"warp", "repeats_x", config.weave.ends, config.repeats_x}, config);
+  config.weft =
+      read_system(document, {"weft", "repeats_y", config.weave.picks, config.repeats_y}, config);
+}
+
+int fiber_named(const TomlTable& table, const FabricConfig& config) {
+  const std::string name = table.string("fiber");
+  std::string known;
+  for (std::size_t k = 0; k < config.fibers.size(); ++k) {
+    if (config.fibers[k].name == name) return static_cast<int>(k);
+    known += (known.empty() ? "" : ", ") + config.fibers[k].name;
+  }
+  table.fail("fiber", "expected the name of a [fiber.NAME] table: " + known);
+}
+
+void read_found(const TomlTable& table, FabricConfig& config) {
+  config.curves = read_curves_config(table);
+  if (config.curves->as_yarns) {
+    config.curves->sequence = read_sequence(table, "curves", config);
+  } else {
+    config.curves->fiber = fiber_named(table, config);
+  }
+}
+
 }  // namespace
 
 FabricConfig read_fabric_config(const TomlTable& document) {
@@ -166,12 +197,6 @@ FabricConfig read_fabric_config(const TomlTable& document) {
   config.seed = static_cast<std::uint64_t>(document.integer("seed", 0, 1'000'000'000, 1));
   config.light_from_both_sides = document.choice("light_from", {"face", "both"}, "face") == "both";
   config.segment_mm = kMmPerUm * document.number("segment_um", {.min = 1, .max = 10000});
-
-  const TomlTable weave = document.table("weave");
-  config.weave = read_weave(weave);
-  config.repeats_x = static_cast<int>(weave.integer("repeats_x", 1, 64));
-  config.repeats_y = static_cast<int>(weave.integer("repeats_y", 1, 64));
-  config.crimp_warp = weave.number("crimp_warp", {.min = 0, .max = 1}, 0.5);
 
   const TomlTable fibers = document.table("fiber");
   for (const std::string& name : fibers.table_names())
@@ -187,10 +212,18 @@ FabricConfig read_fabric_config(const TomlTable& document) {
           table.optional_number("spacing_mm", {.min = 1e-3, .max = 100}).value_or(0);
     }
   }
-  config.warp =
-      read_system(document, {"warp", "repeats_x", config.weave.ends, config.repeats_x}, config);
-  config.weft =
-      read_system(document, {"weft", "repeats_y", config.weave.picks, config.repeats_y}, config);
+  if (document.has("knit")) {
+    config.knit = read_knit(document.table("knit"));
+    config.knit->sequence = read_sequence(document.table("knit"), "knit", config);
+  } else if (document.has("curves")) {
+    read_found(document.table("curves"), config);
+  } else {
+    read_woven(document, config);
+  }
+  if (const auto pile = document.optional_table("pile")) {
+    config.pile = read_pile(*pile);
+    config.pile->fiber = fiber_named(*pile, config);
+  }
   if (config.fibers.size() > kMaxMaterials) {
     document.fail("yarn", fmt::format("expected at most {} fibers in different colours, found {}",
                                       kMaxMaterials, config.fibers.size()));

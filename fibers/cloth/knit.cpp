@@ -79,6 +79,21 @@ std::optional<LoopForm> search_loop(const LoopForm& start, double diameter) {
 
 }  // namespace
 
+KnitConfig read_knit(const TomlTable& table) {
+  constexpr double kCmPerMm = 0.1;
+  KnitConfig knit;
+  const bool is_rib = table.choice("structure", {"jersey", "rib 1x1"}) == "rib 1x1";
+  knit.structure = is_rib ? KnitStructure::kRib1x1 : KnitStructure::kJersey;
+  const NumberRange per_cm{.min = 0.1, .max = 500};
+  knit.wales_per_mm = kCmPerMm * table.number("wales_per_cm", per_cm);
+  knit.courses_per_mm = kCmPerMm * table.number("courses_per_cm", per_cm);
+  knit.wales = static_cast<int>(table.integer("wales", 1, 1000));
+  if (is_rib && knit.wales % 2 != 0)
+    table.fail("wales", "expected an even number: a rib has wales on either side in turn");
+  knit.courses = static_cast<int>(table.integer("courses", 2, 1000));
+  return knit;
+}
+
 Vec3d LoopForm::at(double t) const {
   const double x = wale_mm * (t + widening * std::sin(2 * t)) / kWaleTurn;
   const double y = -height_mm * std::cos(t);
@@ -118,6 +133,11 @@ double distance_within_course(const LoopForm& loop, double diameter_mm, int samp
     }
   }
   return std::sqrt(least);
+}
+
+double usual_loop_length(const KnitConfig& knit) {
+  constexpr double kMunden = 21.6;
+  return std::sqrt(kMunden / (knit.wales_per_mm * knit.courses_per_mm));
 }
 
 double loop_length(const LoopForm& loop) {

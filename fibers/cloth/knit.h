@@ -21,6 +21,7 @@
 
 #include "fibers/cloth/centre_line.h"
 #include "fibers/math/vector.h"
+#include "formats/toml_table.h"
 
 namespace heddle {
 
@@ -33,7 +34,16 @@ struct KnitConfig {
   int wales = 1;              // in the tile; even in a rib
   int courses = 2;            // in the tile
   std::vector<int> sequence;  // index into FabricConfig::yarns per course, repeated over the tile
+
+  double width_mm() const { return wales / wales_per_mm; }
+  double height_mm() const { return courses / courses_per_mm; }
+  int yarn_of(int course) const {
+    return sequence[static_cast<std::size_t>(course) % sequence.size()];
+  }
 };
+
+/// Reads [knit] but for the yarns of its courses.
+KnitConfig read_knit(const TomlTable& table);
 
 /// The form of all loops of a knit. Lengths in mm.
 struct LoopForm {
@@ -54,6 +64,9 @@ struct LoopForm {
 /// `samples` points per wale.
 double distance_of_courses(const LoopForm& loop, int samples);
 double distance_within_course(const LoopForm& loop, double diameter_mm, int samples);
+
+/// Length of yarn in a loop of a relaxed plain knit (mm), after Munden 1959.
+double usual_loop_length(const KnitConfig& knit);
 
 /// Length of yarn in one loop, mm.
 double loop_length(const LoopForm& loop);

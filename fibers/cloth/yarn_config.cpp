@@ -168,6 +168,11 @@ double fill_of(const YarnConfig& yarn, const FiberType& fiber) {
          (yarn.width_mm * yarn.height_mm);
 }
 
+double YarnConfig::round_radius_mm(double fiber_radius_mm) const {
+  if (ply_mm) return reach_of(*ply_mm);
+  return std::sqrt((0.5 * width_mm - fiber_radius_mm) * (0.5 * height_mm - fiber_radius_mm));
+}
+
 YarnConfig read_yarn(const TomlTable& table, const std::string& name,
                      std::vector<FiberType>& fibers) {
   YarnConfig yarn;
@@ -175,6 +180,7 @@ YarnConfig read_yarn(const TomlTable& table, const std::string& name,
   yarn.fiber = find_fiber(table, fibers);
   const FiberType fiber = fibers[static_cast<std::size_t>(yarn.fiber)];
   if (table.has("color")) yarn.fiber = dyed_fiber(yarn.fiber, read_color(table, "color"), fibers);
+  yarn.contact_flattening = table.number("contact_flattening", {.min = 0, .max = 0.5}, 0);
   if (table.has("from")) {
     read_yarn_file(table, fiber.radius_mm, yarn);
     return yarn;
@@ -189,7 +195,6 @@ YarnConfig read_yarn(const TomlTable& table, const std::string& name,
   }
   read_fibers_per_ply(table, count, fiber, yarn);
   read_section(table, count.has_value(), fiber, yarn);
-  yarn.contact_flattening = table.number("contact_flattening", {.min = 0, .max = 0.5}, 0);
   const NumberRange twist{.min = -5000, .max = 5000};
   yarn.yarn_turns_per_mm = 1e-3 * table.number("yarn_twist_per_m", twist);
   yarn.ply_turns_per_mm = 1e-3 * table.number("ply_twist_per_m", twist);

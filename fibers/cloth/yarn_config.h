@@ -53,7 +53,6 @@ struct YarnConfig {
   Loops loops;
   std::vector<Slubs> slubs;
   Neps neps;
-  std::string file_text;  // canonical text of the file named by `from`; empty without one
 
   /// Radius (mm) of the round yarn, up to the axes of its outermost fibers. Woven, its section is
   /// flattened to width_mm x height_mm; flyaways keep their lengths.
@@ -63,8 +62,8 @@ struct YarnConfig {
 /// Reads a table [fiber.NAME].
 FiberType read_fiber(const TomlTable& table, const std::string& name);
 
-/// Reads the keys of one yarn from a table [yarn.NAME], [warp] or [weft]. Its structure may stand
-/// in a file of its own, named by `from`. A yarn with colours of its own adds a fiber type.
+/// Reads the keys of one yarn from a table [yarn.NAME], [warp] or [weft]. They may stand in a file
+/// of their own, named by `from`. A yarn with colours of its own adds a fiber type.
 YarnConfig read_yarn(const TomlTable& table, const std::string& name,
                      std::vector<FiberType>& fibers);
 

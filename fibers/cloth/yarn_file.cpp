@@ -46,7 +46,7 @@ void read_irregularities(const TomlTable& table, YarnConfig& yarn) {
 }
 
 void read_yarn_file(const TomlTable& table, double fiber_radius_mm, YarnConfig& yarn) {
-  const TomlTable file = TomlTable::load(table.existing_file("from"));
+  const TomlTable file = TomlTable::load(table.content_file("from"));
   yarn.plies = static_cast<int>(file.integer("plies", 1, 12));
   yarn.fibers_per_ply = static_cast<int>(file.integer("fibers_per_ply", 1, 2000));
   const NumberRange twist{.min = -5000, .max = 5000};
@@ -57,7 +57,6 @@ void read_yarn_file(const TomlTable& table, double fiber_radius_mm, YarnConfig& 
   yarn.ply_mm = read_ply(file.table("ply"));
   read_irregularities(file, yarn);
   file.finish();
-  yarn.file_text = file.canonical_text();
   scale_lengths(table.number("scale", {.min = 0.01, .max = 100}, 1), yarn);
   const double round = 2 * (reach_of(*yarn.ply_mm) + fiber_radius_mm);
   const NumberRange section{.min = 1e-3, .max = 100};
