@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <map>
 #include <numeric>
 #include <optional>
 #include <stdexcept>
@@ -88,6 +89,35 @@ struct SystemKeys {
   int repeat_count;
 };
 
+/// Every thread of the weave's repeat in the colour that the draft gives it.
+void take_draft_colors(const TomlTable& table, const SystemKeys& keys, FabricConfig& config,
+                       ThreadSystem& system) {
+  const bool is_warp = std::string_view(keys.table) == "warp";
+  const DraftThreads& threads = is_warp ? config.weave.warp : config.weave.weft;
+  if (threads.color.empty())
+    table.fail("colors", "expected a [weave] draft that gives its threads colours");
+  if (keys.of_weave % static_cast<int>(system.sequence.size()) != 0) {
+    table.fail("sequence", fmt::format("expected a length that divides the {} threads of the draft",
+                                       keys.of_weave));
+  }
+  std::map<std::pair<int, int>, int> dyed;  // by yarn and fiber
+  std::vector<int> sequence;
+  for (int k = 0; k < keys.of_weave; ++k) {
+    const int plain = system.yarn_at(k);
+    YarnConfig yarn = config.yarns[static_cast<std::size_t>(plain)];
+    const std::array<float, 3>& color = threads.color[static_cast<std::size_t>(k)];
+    yarn.fiber = dyed_fiber(yarn.fiber, Rgbd(color[0], color[1], color[2]), config.fibers);
+    const auto [found, is_new] =
+        dyed.try_emplace({plain, yarn.fiber}, static_cast<int>(config.yarns.size()));
+    if (is_new) {
+      yarn.name += fmt::format(" in colour {}", dyed.size());
+      config.yarns.push_back(std::move(yarn));
+    }
+    sequence.push_back(found->second);
+  }
+  system.sequence = std::move(sequence);
+}
+
 ThreadSystem read_system(const TomlTable& document, const SystemKeys& keys, FabricConfig& config) {
   const TomlTable table = document.table(keys.table);
   const TomlTable weave = document.table("weave");
@@ -97,6 +127,10 @@ ThreadSystem read_system(const TomlTable& document, const SystemKeys& keys, Fabr
   if (table.has("per_cm") && table.has("spacing_mm"))
     table.fail("per_cm", "expected either per_cm or spacing_mm");
   system.sequence = read_sequence(table, keys.table, config);
+  if (table.has("colors")) {
+    table.choice("colors", {"draft"});
+    take_draft_colors(table, keys, config, system);
+  }
   const int count = keys.of_weave * keys.repeat_count;
   if (count % static_cast<int>(system.sequence.size()) != 0) {
     weave.fail(keys.repeats,

@@ -35,7 +35,7 @@ constexpr double kPointsPerTurn = 14;
 
 // Segments of the shortest open fiber, and most segments of a long one.
 constexpr int kFewestSegments = 4;
-constexpr int kMostSegments = 1 << 16;
+constexpr int kMostSegmentsPerFiber = 1 << 16;
 
 // A loop rises above its fiber by at least this factor (the published generator's).
 constexpr double kLeastLift = 1.05;
@@ -375,7 +375,7 @@ class FibersOfYarn {
   template <class PointAt>
   void add_open_fiber(double from, double to, double length_mm, PointAt&& point_at) {
     const int segments = std::clamp(static_cast<int>(std::ceil(length_mm / segment_mm_)),
-                                    kFewestSegments, kMostSegments);
+                                    kFewestSegments, kMostSegmentsPerFiber);
     for (int k = 0; k <= segments; ++k) add_point(point_at(from + (to - from) * k / segments));
     end_fiber(true);
   }

@@ -404,7 +404,9 @@ TEST(FibersOfYarnLaw, OnlyFlyawaysLeaveAFlattenedYarn) {
     for (std::uint32_t p = exemplar.first_point[f]; p < exemplar.first_point[f + 1]; ++p) {
       const Vec3& point = exemplar.points[p];
       const double across = std::hypot((point.y() - 0.5) / 0.195, point.z() / 0.095);
-      if (exemplar.is_open[f] == 0) EXPECT_LE(across, 1 + 1e-4);
+      if (exemplar.is_open[f] == 0) {
+        EXPECT_LE(across, 1 + 1e-4);
+      }
       highest = std::max(highest, std::abs(static_cast<double>(point.z())));
     }
   }
