@@ -191,6 +191,13 @@ void read_found(const TomlTable& table, FabricConfig& config) {
 
 }  // namespace
 
+double thickest_yarn_mm(const FabricConfig& config, const std::vector<int>& yarns) {
+  double thickest = 0;
+  for (const int k : yarns)
+    thickest = std::max({thickest, config.yarn(k).width_mm, config.yarn(k).height_mm});
+  return thickest;
+}
+
 FabricConfig read_fabric_config(const TomlTable& document) {
   FabricConfig config;
   config.name = document.string("name");

@@ -60,6 +60,9 @@ struct FabricConfig {
   }
 };
 
+/// Larger side of the largest section among these yarns.
+double thickest_yarn_mm(const FabricConfig& config, const std::vector<int>& yarns);
+
 /// Reads the keys that describe the cloth ([weave], [warp], [weft], [fiber.NAME], name, light_from,
 /// seed). The caller reads the other sections and calls finish() on the document.
 FabricConfig read_fabric_config(const TomlTable& document);

@@ -25,10 +25,7 @@ void add_courses(const FabricConfig& config, Exemplar& exemplar, const AddYarn& 
   const KnitConfig& knit = *config.knit;
   exemplar.width_mm = static_cast<float>(knit.width_mm());
   exemplar.height_mm = static_cast<float>(knit.height_mm());
-  double thickest = 0;
-  for (const int k : knit.sequence)
-    thickest = std::max({thickest, config.yarn(k).width_mm, config.yarn(k).height_mm});
-  const LoopForm loop = solve_loop(knit, thickest);
+  const LoopForm loop = solve_loop(knit, thickest_yarn_mm(config, knit.sequence));
   for (int course = 0; course < knit.courses; ++course) {
     const YarnConfig& yarn = config.yarn(knit.yarn_of(course));
     add_yarn(yarn, centre_line_of_course(loop, knit, course, yarn.width_mm, yarn.height_mm));
