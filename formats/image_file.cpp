@@ -398,6 +398,36 @@ PngHeader read_png_header(const std::filesystem::path& path) {
   return header;
 }
 
+RgbPicture read_png(const std::filesystem::path& path, int max_extent) {
+  return parse_png(read_whole_file(path), path.string(), max_extent);
+}
+
+RgbPicture parse_png(std::span<const std::byte> bytes, const std::string& name, int max_extent) {
+  png_image image{};
+  image.version = PNG_IMAGE_VERSION;
+  const auto fail = [&](const std::string& reason) {
+    png_image_free(&image);
+    throw FileError(fmt::format("{}: cannot read as a PNG image: {}", name, reason));
+  };
+  if (png_image_begin_read_from_memory(&image, bytes.data(), bytes.size()) == 0)
+    fail(image.message);
+  const auto limit = static_cast<png_uint_32>(max_extent);
+  if (image.width > limit || image.height > limit) {
+    fail(fmt::format("{} x {} pixels; expected at most {} x {}", image.width, image.height,
+                     max_extent, max_extent));
+  }
+  // Deflate packs up to 1032 bytes into one; a pixel takes at least one bit.
+  if (std::uint64_t{image.width} * image.height / 8 / 1032 > bytes.size())
+    fail("too short for its size in pixels");
+  image.format = PNG_FORMAT_RGB;
+  RgbPicture picture{static_cast<int>(image.width), static_cast<int>(image.height), {}};
+  picture.rgb.resize(PNG_IMAGE_SIZE(image));
+  const png_color white{255, 255, 255};
+  if (png_image_finish_read(&image, &white, picture.rgb.data(), 0, nullptr) == 0)
+    fail(image.message);
+  return picture;
+}
+
 void write_png(const std::filesystem::path& path, int width, int height,
                const std::vector<std::uint8_t>& rgb) {
   assert(width > 0 && height > 0);

@@ -4,9 +4,11 @@
 // 8-bit PNG. Row-major, row 0 at the top. Equal content gives equal bytes (no time stamps). Errors:
 // FileError. Tested in tests/formats/image_file_test.cpp.
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -44,6 +46,17 @@ struct PngHeader {
   int channels = 0;  // 1 grey, 2 grey and alpha, 3 RGB (or a palette), 4 RGB and alpha
 };
 PngHeader read_png_header(const std::filesystem::path& path);
+
+/// 8-bit pixels as shown on a screen.
+struct RgbPicture {
+  int width = 0;
+  int height = 0;
+  std::vector<std::uint8_t> rgb;  // [height][width][3]
+};
+/// Any kind of PNG; transparency lies on white. At most `max_extent` pixels along an edge.
+RgbPicture read_png(const std::filesystem::path& path, int max_extent);
+/// The same for the bytes of a file; `name` stands for it in messages.
+RgbPicture parse_png(std::span<const std::byte> bytes, const std::string& name, int max_extent);
 
 /// [height][width][3] bytes, written atomically.
 void write_png(const std::filesystem::path& path, int width, int height,
