@@ -30,8 +30,9 @@ struct FabricConfig {
   // weave repeats in the tile along the weft (x) and along the warp (y)
   int repeats_x = 1;
   int repeats_y = 1;
-  double crimp_warp = 0.5;  // share of the crimp height that the warp takes, 0 .. 1
-  double segment_mm = 0;    // target length of a fiber segment
+  // share of the pull that the weft takes, 0 .. 1, and thus of the crimp that the warp takes
+  double crimp_warp = 0.5;
+  double segment_mm = 0;  // target length of a fiber segment
   std::vector<FiberType> fibers;
   std::vector<YarnConfig> yarns;
   ThreadSystem warp;

@@ -21,15 +21,23 @@ constexpr double kMostSegments = 0x1p31;
 }  // namespace
 
 ExemplarForecast forecast_exemplar(const FabricConfig& config) {
-  const double ends = static_cast<double>(config.weave.ends) * config.repeats_x;
-  const double picks = static_cast<double>(config.weave.picks) * config.repeats_y;
-  const auto segments_of = [&](const YarnConfig& yarn, double yarns, double period_mm) {
-    return yarns * yarn.plies * yarn.fibers_per_ply *
-           segments_per_fiber(yarn, period_mm, config.segment_mm);
+  const double width = warp_places(config).period_mm;
+  const double height = weft_places(config).period_mm;
+  ExemplarForecast forecast;
+  const auto add_system = [&](const ThreadSystem& system, double yarns, double period_mm) {
+    // Whole sequences fill the tile.
+    for (const int k : system.sequence) {
+      const YarnConfig& yarn = config.yarns[static_cast<std::size_t>(k)];
+      forecast.segments += yarns / static_cast<double>(system.sequence.size()) * yarn.plies *
+                           yarn.fibers_per_ply *
+                           segments_per_fiber(yarn, period_mm, config.segment_mm);
+    }
+    forecast.yarns += static_cast<std::uint64_t>(yarns);
   };
-  const double segments = segments_of(config.warp_yarn(0), ends, picks * config.weft.spacing_mm) +
-                          segments_of(config.weft_yarn(0), picks, ends * config.warp.spacing_mm);
-  return {segments, kPointBytesPerSegment * segments};
+  add_system(config.warp, static_cast<double>(config.weave.ends) * config.repeats_x, height);
+  add_system(config.weft, static_cast<double>(config.weave.picks) * config.repeats_y, width);
+  forecast.bytes = kPointBytesPerSegment * forecast.segments;
+  return forecast;
 }
 
 Exemplar synthesize(const FabricConfig& config, const std::function<void()>& yarn_done) {
@@ -52,16 +60,18 @@ Exemplar synthesize(const FabricConfig& config, const std::function<void()>& yar
   // fibers have a point more than segments
   exemplar.points.reserve(static_cast<std::size_t>(1.25 * forecast.segments));
   std::uint32_t yarn_index = 0;
-  const auto add_system = [&](const YarnConfig& yarn, const std::vector<YarnPath>& system) {
-    for (const YarnPath& path : system) {
+  const auto add_system = [&](const ThreadSystem& system, const std::vector<YarnPath>& paths) {
+    for (std::size_t k = 0; k < paths.size(); ++k) {
+      const YarnConfig& yarn =
+          config.yarns[static_cast<std::size_t>(system.yarn_at(static_cast<int>(k)))];
       add_fibers_of_yarn(yarn, config.fibers[static_cast<std::size_t>(yarn.fiber)].radius_mm,
-                         centre_line(path, yarn.width_mm, yarn.height_mm), config.segment_mm,
-                         config.seed, yarn_index++, exemplar);
+                         centre_line(paths[k]), config.segment_mm, config.seed, yarn_index++,
+                         exemplar);
       yarn_done();
     }
   };
-  add_system(config.warp_yarn(0), paths.warp);
-  add_system(config.weft_yarn(0), paths.weft);
+  add_system(config.warp, paths.warp);
+  add_system(config.weft, paths.weft);
   // The last point of a fiber that goes on is its first, one period on, to the last bit.
   for (std::size_t f = 0; f < exemplar.fiber_count(); ++f) {
     if (exemplar.is_open[f] != 0) continue;

@@ -3,6 +3,7 @@
 // Weave, yarns, plies, fibers: the exemplar tile of a fabric. Tested in
 // tests/fibers/cloth/synthesize_test.cpp.
 
+#include <cstdint>
 #include <functional>
 
 #include "fibers/cloth/exemplar.h"
@@ -12,6 +13,7 @@ namespace heddle {
 
 /// What synthesize() will make of a config, without making it.
 struct ExemplarForecast {
+  std::uint64_t yarns = 0;
   double segments = 0;
   double bytes = 0;  // of memory, with what writing the fibers takes
 };

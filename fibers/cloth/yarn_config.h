@@ -16,6 +16,7 @@ namespace heddle {
 struct FiberType {
   std::string name;
   double radius_mm = 0;
+  double density_g_cm3 = 0;  // 0: not told
   FiberScattering scattering;
 };
 
@@ -25,6 +26,10 @@ struct YarnConfig {
   int fiber = 0;         // index into FabricConfig::fibers
   double width_mm = 0;   // full width of the flattened yarn in the plane of the cloth
   double height_mm = 0;  // full height of the flattened yarn
+  // room that it has between its neighbours; 0: the spacing of its system
+  double spacing_mm = 0;
+  // share of its height that it loses where it is pressed hardest, 0 .. 0.5
+  double contact_flattening = 0;
   int plies = 1;
   int fibers_per_ply = 1;
   // twist of the plies about the yarn, positive = Z; snapped to whole turns per tile
@@ -39,9 +44,17 @@ struct YarnConfig {
 /// Reads a table [fiber.NAME].
 FiberType read_fiber(const TomlTable& table, const std::string& name);
 
-/// Reads the keys of one yarn from a table [yarn.NAME], [warp] or [weft].
+/// Reads the keys of one yarn from a table [yarn.NAME], [warp] or [weft]. A yarn with colours of
+/// its own adds a fiber type.
 YarnConfig read_yarn(const TomlTable& table, const std::string& name,
-                     const std::vector<FiberType>& fibers);
+                     std::vector<FiberType>& fibers);
+
+/// The fiber type `fiber` in other colours; found among `fibers` or added to them.
+int fiber_in_colors(int fiber, const Rgbd& color_r, const Rgbd& color_tt,
+                    std::vector<FiberType>& fibers);
+
+/// Share of the area of a yarn's section that its fibers fill; above 0.9 no real fibers fit.
+double fill_of(const YarnConfig& yarn, const FiberType& fiber);
 
 }  // namespace heddle
 

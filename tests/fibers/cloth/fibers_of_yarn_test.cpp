@@ -12,7 +12,10 @@ namespace heddle {
 namespace {
 
 CentreLine flat_yarn(const YarnConfig& yarn, double length_mm, bool is_warp) {
-  return centre_line({is_warp, 0.5, length_mm / 4, 4, {0, 0, 0, 0}}, yarn.width_mm, yarn.height_mm);
+  const auto shape = std::make_shared<const YarnShape>(YarnShape{
+      length_mm / 4, std::vector<double>(4, 0.0), std::vector<double>(4, 0.5 * yarn.width_mm),
+      std::vector<double>(4, 0.5 * yarn.height_mm)});
+  return centre_line({is_warp, 0.5, length_mm, shape});
 }
 
 YarnConfig yarn_of(int plies, int fibers, double wander_deg) {
