@@ -139,6 +139,7 @@ Report fabric_report(const FabricDocument& fabric) {
     } else if (config.curves) {
       describe_curves(*config.curves, config, report);
     } else {
+      report["weave"] = config.weave.notation;
       describe_weave(config.weave, report);
       describe_threads(config, lay_yarns(config), report);
     }
