@@ -8,8 +8,6 @@
 #include <nlohmann/json.hpp>
 
 #include "fibers/baked/fabric_pack.h"
-#include "fibers/cloth/synthesize.h"
-#include "fibers/tracing/tile_scene.h"
 #include "formats/atomic_file.h"
 #include "formats/curve_file.h"
 #include "formats/file_ending.h"
@@ -22,6 +20,7 @@
 #include "pipeline/accuracy/accuracy_table.h"
 #include "pipeline/commands.h"
 #include "pipeline/draft_report.h"
+#include "pipeline/fabric_report.h"
 #include "pipeline/json_file.h"
 #include "pipeline/stages.h"
 #include "render/scene_config.h"
@@ -31,41 +30,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using Report = nlohmann::ordered_json;
-
-double rounded(double value) {
-  return std::stod(fmt::format("{:.4g}", value));
-}
-
-void describe_exemplar(const Exemplar& exemplar, std::uint64_t seed, Report& report) {
-  const ExemplarSummary summary = summarize(exemplar);
-  const TileScene scene(exemplar);
-  report["fibers"] = summary.fibers;
-  report["segments"] = summary.segments;
-  report["tile_mm"] = {rounded(exemplar.width_mm), rounded(exemplar.height_mm)};
-  report["tile_repeats"] = fmt::format(
-      "endless: a ray marches from tile to tile until it hits, leaves the cloth or has "
-      "crossed {} tiles",
-      TileScene::kMaxTiles);
-  report["thickness_mm"] = rounded(summary.thickness_mm);
-  report["volume_fraction"] = rounded(summary.volume_fraction);
-  report["mean_free_path_mm"] = rounded(scene.mean_free_path(seed, kMeanFreePathSamples));
-  report["mean_segment_mm"] = rounded(summary.mean_segment_mm);
-  report["fiber_length_mm_per_mm2"] = rounded(summary.areal_fiber_length_per_mm2);
-  report["fiber_wander_rms_deg"] = rounded(summary.wander_rms_deg);
-  report["ray_tracing_bytes"] = scene.memory_bytes();
-}
-
-Report describe_fabric(const fs::path& path, const CommonOptions& common) {
-  const FabricDocument fabric = read_fabric_document(path, common.fabric_seed);
-  Report report = {{"kind", "fabric config"},
-                   {"name", fabric.config.name},
-                   {"weave", fabric.config.weave.notation}};
-  report["light_from"] = fabric.config.light_from_both_sides ? "both" : "face";
-  report["seed"] = fabric.config.seed;
-  describe_weave(fabric.config.weave, report);
-  describe_exemplar(synthesize(fabric.config), fabric.config.seed, report);
-  return report;
-}
 
 Report describe_surface_fabric(const TomlTable& document) {
   read_surface_model(document);  // says what is wrong with it
@@ -331,7 +295,8 @@ Report describe(const fs::path& path, const CommonOptions& common) {
   if (ending == ".toml") {
     const TomlTable document = TomlTable::load(path);
     if (document.has("model")) return describe_surface_fabric(document);
-    return document.has("weave") ? describe_fabric(path, common) : describe_scene(document);
+    return document.has("weave") ? fabric_report(read_fabric_document(path, common.fabric_seed))
+                                 : describe_scene(document);
   }
   if (ending == ".safetensors") return describe_tensors(path, common);
   if (ending == ".vdb") return describe_vdb(path);

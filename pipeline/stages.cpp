@@ -83,6 +83,22 @@ AccuracyProgress percent_of(Progress& progress) {
   };
 }
 
+// Circles in a hexagonal pattern fill this share of a plane.
+constexpr double kDensestFill = 0.9069;
+
+void warn_of_crowded_yarns(const FabricConfig& config, Console& console) {
+  for (const YarnConfig& yarn : config.yarns) {
+    const double fill = fill_of(yarn, config.fibers[static_cast<std::size_t>(yarn.fiber)]);
+    if (fill <= kDensestFill) continue;
+    console.warn(fmt::format(
+        "{}: the yarn \"{}\" of {:.3g} x {:.3g} mm has room for {:.0f} fibers at most, and holds "
+        "{}; "
+        "they run through each other",
+        config.name, yarn.name, yarn.width_mm, yarn.height_mm,
+        kDensestFill / fill * yarn.plies * yarn.fibers_per_ply, yarn.plies * yarn.fibers_per_ply));
+  }
+}
+
 std::string hash_of_geometry(const Exemplar& exemplar) {
   const auto bytes_of = [](const auto& values) {
     return content_hash(std::as_bytes(std::span(values)));
@@ -296,11 +312,10 @@ Artifact FabricStages::synth() {
     const FabricConfig& config = document_.config;
     for (const std::string& warning : config.weave.warnings) context_->console->warn(warning);
     try {
+      warn_of_crowded_yarns(config, *context_->console);
       const ExemplarForecast forecast = forecast_exemplar(config);
       announce(context_->console, "synth", forecast.segments, "segments", forecast.bytes);
-      const auto yarns = static_cast<std::uint64_t>(config.weave.ends) * config.repeats_x +
-                         static_cast<std::uint64_t>(config.weave.picks) * config.repeats_y;
-      Progress progress(*context_->console, "synth", "yarns", yarns);
+      Progress progress(*context_->console, "synth", "yarns", forecast.yarns);
       const auto yarn_done = [&progress] {
         stop_if_interrupted();
         progress.advance(1);

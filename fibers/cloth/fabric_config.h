@@ -5,9 +5,13 @@
 // tests/fibers/cloth/fabric_config_test.cpp.
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "fibers/cloth/curve_exemplar.h"
+#include "fibers/cloth/knit.h"
+#include "fibers/cloth/pile.h"
 #include "fibers/cloth/weave.h"
 #include "fibers/cloth/yarn_config.h"
 #include "formats/toml_table.h"
@@ -30,15 +34,24 @@ struct FabricConfig {
   // weave repeats in the tile along the weft (x) and along the warp (y)
   int repeats_x = 1;
   int repeats_y = 1;
-  double crimp_warp = 0.5;  // share of the crimp height that the warp takes, 0 .. 1
-  double segment_mm = 0;    // target length of a fiber segment
+  // share of the pull that the weft takes, 0 .. 1, and thus of the crimp that the warp takes
+  double crimp_warp = 0.5;
+  double segment_mm = 0;  // target length of a fiber segment
   std::vector<FiberType> fibers;
   std::vector<YarnConfig> yarns;
   ThreadSystem warp;
   ThreadSystem weft;
+  // Instead of a weave with its warp and weft:
+  std::optional<KnitConfig> knit;
+  std::optional<CurvesConfig> curves;
+  std::optional<PileConfig> pile;      // on any of them
   bool light_from_both_sides = false;  // light_from = "face" | "both"
   std::uint64_t seed = 1;
 
+  const YarnConfig& yarn(int k) const { return yarns[static_cast<std::size_t>(k)]; }
+  const FiberType& fiber_of(const YarnConfig& yarn) const {
+    return fibers[static_cast<std::size_t>(yarn.fiber)];
+  }
   const YarnConfig& warp_yarn(int end) const {
     return yarns[static_cast<std::size_t>(warp.yarn_at(end))];
   }

@@ -3,6 +3,7 @@
 // Weave, yarns, plies, fibers: the exemplar tile of a fabric. Tested in
 // tests/fibers/cloth/synthesize_test.cpp.
 
+#include <cstdint>
 #include <functional>
 
 #include "fibers/cloth/exemplar.h"
@@ -12,6 +13,7 @@ namespace heddle {
 
 /// What synthesize() will make of a config, without making it.
 struct ExemplarForecast {
+  std::uint64_t yarns = 0;
   double segments = 0;
   double bytes = 0;  // of memory, with what writing the fibers takes
 };
@@ -31,7 +33,7 @@ struct ExemplarSummary {
   double volume_fraction = 0;  // fiber volume / (tile area x thickness)
   double mean_segment_mm = 0;
   double areal_fiber_length_per_mm2 = 0;  // mm of fiber per mm^2 of cloth
-  // rms angle of fiber segments against the yarn's own direction in the plane
+  // rms angle of fiber segments against the yarn's own direction in the plane, without open fibers
   double wander_rms_deg = 0;
 };
 ExemplarSummary summarize(const Exemplar& exemplar);

@@ -1,198 +1,476 @@
 #include "fibers/cloth/yarn_paths.h"
 
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <set>
+#include <numeric>
+#include <optional>
 #include <stdexcept>
+#include <string>
+#include <utility>
+
+#include "fibers/math/taut_string.h"
 
 namespace heddle {
 namespace {
 
-// Points per crossing and axis on which the crest height is found; smallest_clearance() on a finer
-// grid judges it.
-constexpr int kSolveSamples = 65;
-// What the grid can miss of the tightest place between its points (measured: 2e-4 of the touching
-// height).
-constexpr double kGridAllowance = 1.001;
-// Crests taller than this many times the touching height mean that the yarns leave no room to pass.
-constexpr double kLargestCrestFactor = 3;
+// Samples along a yarn between two crossings, on the mean.
+constexpr int kSamplesPerCrossing = 24;
+// Sections are laid this much larger, so that what the curve between samples cuts off leaves a gap.
+constexpr double kSectionAllowance = 1.01;
+// The planes of the crossings are balanced until the largest imbalance of forces falls to this
+// share of the largest force, or so many times.
+constexpr double kBalance = 2e-3;
+constexpr int kMostRounds = 400;
+constexpr double kRelaxation = 0.7;
+// Sections are flattened by the forces that were found, and laid again, so many times.
+constexpr int kFlatteningRounds = 3;
+// Between flattened neighbours so much room is left, in half heights of the yarns that pass there.
+constexpr double kPassage = 1;
+constexpr double kNothing = std::numeric_limits<double>::infinity();
 
-// Half height of an elliptic section at a distance from its axis, relative to its half height.
-double section(double distance, double half_width) {
+double section(double distance, double half_width, double half_height) {
   const double u = distance / half_width;
-  return std::sqrt(std::max(0.0, 1 - u * u));
+  return half_height * std::sqrt(std::max(0.0, 1 - u * u));
 }
 
-// The heights at a crossing depend on which yarn lies over there and at the four crossings beside
-// it. Yarns are at most as wide as their spacing, so nothing else can matter.
-unsigned kind_of_crossing(const Weave& weave, int end, int pick) {
-  const auto bit = [&](int e, int p, unsigned value) {
-    return weave.is_warp_up(e, p) ? value : 0U;
-  };
-  return bit(end, pick, 1) | bit(end - 1, pick, 2) | bit(end + 1, pick, 4) | bit(end, pick - 1, 8) |
-         bit(end, pick + 1, 16);
+YarnPlaces places(const FabricConfig& config, const ThreadSystem& system, int count) {
+  YarnPlaces result;
+  for (int k = 0; k < count; ++k) {
+    const double own = config.yarns[static_cast<std::size_t>(system.yarn_at(k))].spacing_mm;
+    const double spacing = own > 0 ? own : system.spacing_mm;
+    result.centre_mm.push_back(result.period_mm + 0.5 * spacing);
+    result.spacing_mm.push_back(spacing);
+    result.period_mm += spacing;
+  }
+  return result;
 }
 
-struct CrossingPoint {
-  unsigned kind;  // of the crossing
-  double dx, dy;  // from the crossing
-  double gap;     // between the two axes; negative where the yarns lie the wrong way round
-  double needed;  // by the two sections
+/// The yarns of one system over one repeat, and what is known of them so far.
+struct System {
+  std::vector<double> centre;  // [yarn] across it
+  std::vector<double> room;    // [yarn] its spacing
+  std::vector<double> width;   // [yarn] half of the section, flattened nowhere
+  std::vector<double> height;  // [yarn]
+  std::vector<double> yield;   // [yarn] how far contact flattens it
+  std::vector<double> widest;  // [yarn] half of the section: others must pass beside it
+  double period = 0;           // across all yarns of the repeat
+  double tension = 0;
+  std::vector<std::vector<double>> heights;   // [yarn][sample]
+  std::vector<std::vector<double>> flatness;  // [yarn][crossing] height of the section, relative
+  std::vector<std::vector<double>> force;     // [yarn][crossing] away from the yarn that it crosses
+
+  std::size_t count() const { return centre.size(); }
+  double half_height(std::size_t yarn, std::size_t crossing) const {
+    return height[yarn] * flatness[yarn][crossing];
+  }
+  double half_width(std::size_t yarn, std::size_t crossing) const {
+    return std::min(width[yarn] / flatness[yarn][crossing], widest[yarn]);
+  }
 };
 
-// Calls f(CrossingPoint) on a grid over one crossing of each kind, all in vertical mm. There are at
-// most 2^5 kinds, and all crossings of the tile are copies of these.
-template <class F>
-void for_each_crossing_point(const FabricConfig& config, const YarnPaths& paths, int samples,
-                             F&& f) {
-  const double a_warp = 0.5 * config.warp_yarn(0).width_mm;
-  const double a_weft = 0.5 * config.weft_yarn(0).width_mm;
-  const auto over_crossing = [&](int end, int pick, unsigned kind) {
-    const YarnPath& warp = paths.warp[static_cast<std::size_t>(end)];
-    const YarnPath& weft = paths.weft[static_cast<std::size_t>(pick)];
-    const double sign = config.weave.is_warp_up(end, pick) ? 1 : -1;
-    for (int iy = 0; iy < samples; ++iy) {
-      const double dy = a_weft * (2.0 * iy / (samples - 1) - 1);
-      for (int ix = 0; ix < samples; ++ix) {
-        const double dx = a_warp * (2.0 * ix / (samples - 1) - 1);
-        f(CrossingPoint{
-            kind, dx, dy,
-            sign * (warp.height_at(weft.across_mm + dy) - weft.height_at(warp.across_mm + dx)),
-            0.5 * (config.warp_yarn(0).height_mm * section(dx, a_warp) +
-                   config.weft_yarn(0).height_mm * section(dy, a_weft))});
+class Loom {
+ public:
+  explicit Loom(const FabricConfig& config)
+      : weave_(config.weave),
+        warp_(system(config, config.warp, weave_.ends)),
+        weft_(system(config, config.weft, weave_.picks)) {
+    warp_.tension = 1 - config.crimp_warp;
+    weft_.tension = config.crimp_warp;
+    for (System* own : {&warp_, &weft_}) {
+      const System& other = own == &warp_ ? weft_ : warp_;
+      const double thickest = *std::max_element(other.height.begin(), other.height.end());
+      for (std::size_t yarn = 0; yarn < own->count(); ++yarn) {
+        own->widest.push_back(
+            std::max(own->width[yarn], 0.5 * (own->room[yarn] - kPassage * thickest)));
+      }
+      own->flatness.assign(own->count(), std::vector<double>(other.count(), 1.0));
+      own->force.assign(own->count(), std::vector<double>(other.count(), 0.0));
+      own->heights.resize(own->count());
+    }
+    plane_.assign(warp_.count() * weft_.count(), 0);
+  }
+
+  void lay() {
+    bool yields = false;
+    for (const System* own : {&warp_, &weft_}) {
+      for (const double yield : own->yield) yields = yields || yield > 0;
+    }
+    balance();
+    for (int round = 0; yields && round < kFlatteningRounds; ++round) {
+      flatten(warp_);
+      flatten(weft_);
+      balance();
+    }
+  }
+
+  double steepest_slope() const {
+    double steepest = 0;
+    for (const System* own : {&warp_, &weft_}) {
+      const double step = step_of(*own);
+      for (const std::vector<double>& heights : own->heights) {
+        for (std::size_t i = 0; i < heights.size(); ++i) {
+          const double rise = heights[(i + 1) % heights.size()] - heights[i];
+          steepest = std::max(steepest, std::abs(rise) / step);
+        }
       }
     }
-  };
-  std::set<unsigned> known;
-  for (int pick = 0; pick < config.weave.picks; ++pick) {
-    for (int end = 0; end < config.weave.ends; ++end) {
-      const unsigned kind = kind_of_crossing(config.weave, end, pick);
-      if (known.insert(kind).second) over_crossing(end, pick, kind);
+    return steepest;
+  }
+
+  std::vector<std::shared_ptr<const YarnShape>> shapes(bool is_warp) const {
+    const System& own = is_warp ? warp_ : weft_;
+    std::vector<std::shared_ptr<const YarnShape>> shapes;
+    for (std::size_t yarn = 0; yarn < own.count(); ++yarn) {
+      YarnShape shape;
+      shape.step_mm = step_of(own);
+      shape.height_mm = own.heights[yarn];
+      for (std::size_t i = 0; i < shape.height_mm.size(); ++i) {
+        const auto [width, height] = section_at(own, yarn, shape.step_mm * static_cast<double>(i));
+        shape.half_width_mm.push_back(width);
+        shape.half_height_mm.push_back(height);
+      }
+      shapes.push_back(std::make_shared<const YarnShape>(std::move(shape)));
+    }
+    return shapes;
+  }
+
+ private:
+  System system(const FabricConfig& config, const ThreadSystem& threads, int of_weave) const {
+    const int count = std::lcm(of_weave, static_cast<int>(threads.sequence.size()));
+    const YarnPlaces where = places(config, threads, count);
+    System result;
+    result.centre = where.centre_mm;
+    result.room = where.spacing_mm;
+    result.period = where.period_mm;
+    for (int k = 0; k < count; ++k) {
+      const YarnConfig& yarn = config.yarns[static_cast<std::size_t>(threads.yarn_at(k))];
+      result.width.push_back(0.5 * yarn.width_mm);
+      result.height.push_back(0.5 * yarn.height_mm);
+      result.yield.push_back(yarn.contact_flattening);
+    }
+    return result;
+  }
+
+  const System& crossed_by(const System& own) const { return &own == &warp_ ? weft_ : warp_; }
+  std::size_t samples_of(const System& own) const {
+    return kSamplesPerCrossing * crossed_by(own).count();
+  }
+  double step_of(const System& own) const {
+    return crossed_by(own).period / static_cast<double>(samples_of(own));
+  }
+  bool lies_above(const System& own, std::size_t yarn, std::size_t crossing) const {
+    const bool is_warp = &own == &warp_;
+    return weave_.is_warp_up(static_cast<int>(is_warp ? yarn : crossing),
+                             static_cast<int>(is_warp ? crossing : yarn)) == is_warp;
+  }
+  double& plane(const System& own, std::size_t yarn, std::size_t crossing) {
+    return &own == &warp_ ? plane_[yarn * weft_.count() + crossing]
+                          : plane_[crossing * weft_.count() + yarn];
+  }
+
+  /// Calls visit(sample, distance from the crossed yarn's axis) for the samples of a yarn that lie
+  /// over or under the yarn of a crossing.
+  template <class Visit>
+  void for_each_sample(const System& own, std::size_t yarn, std::size_t crossing,
+                       Visit&& visit) const {
+    const System& other = crossed_by(own);
+    const double step = step_of(own);
+    const auto samples = static_cast<std::ptrdiff_t>(samples_of(own));
+    const double half = other.half_width(crossing, yarn);
+    const double centre = other.centre[crossing];
+    for (auto i = static_cast<std::ptrdiff_t>(std::ceil((centre - half) / step));
+         static_cast<double>(i) * step <= centre + half; ++i) {
+      visit(static_cast<std::size_t>((i + samples) % samples),
+            static_cast<double>(i) * step - centre);
     }
   }
-}
 
-// Smallest gap, to the last bit, at this place of a crossing among all its copies in the tile.
-// Rounding is monotonic, so the copies along x and along y need not be paired.
-double smallest_gap_of_copies(const FabricConfig& config, const YarnPaths& paths, int end, int pick,
-                              const CrossingPoint& point) {
-  const double sign = config.weave.is_warp_up(end, pick) ? 1 : -1;
-  const auto step_x = static_cast<std::size_t>(config.weave.ends);
-  const auto step_y = static_cast<std::size_t>(config.weave.picks);
-  double upper = std::numeric_limits<double>::infinity();
-  double lower = -upper;
-  for (std::size_t p = static_cast<std::size_t>(pick); p < paths.weft.size(); p += step_y) {
-    upper = std::min(upper, sign * paths.warp[static_cast<std::size_t>(end)].height_at(
-                                       paths.weft[p].across_mm + point.dy));
+  /// Pulls one yarn tight between the planes of its crossings, and finds its forces there.
+  void pull(System& own, std::size_t yarn) {
+    const System& other = crossed_by(own);
+    const std::size_t samples = samples_of(own);
+    std::vector<double> floor(samples, -kNothing);
+    std::vector<double> ceiling(samples, kNothing);
+    for (std::size_t crossing = 0; crossing < other.count(); ++crossing) {
+      const bool above = lies_above(own, yarn, crossing);
+      const double level = plane(own, yarn, crossing);
+      for_each_sample(own, yarn, crossing, [&](std::size_t i, double distance) {
+        const double thick = kSectionAllowance * section(distance, other.half_width(crossing, yarn),
+                                                         other.half_height(crossing, yarn));
+        if (above) {
+          floor[i] = std::max(floor[i], level + thick);
+        } else {
+          ceiling[i] = std::min(ceiling[i], level - thick);
+        }
+      });
+    }
+    // Where two sections meet, rounding must not close the way between them.
+    for (std::size_t i = 0; i < samples; ++i) {
+      if (floor[i] > ceiling[i]) floor[i] = ceiling[i] = 0.5 * (floor[i] + ceiling[i]);
+    }
+    std::vector<double>& heights = own.heights[yarn];
+    heights = taut_string(floor, ceiling);
+    for (std::size_t crossing = 0; crossing < other.count(); ++crossing) {
+      double bend = 0;
+      for_each_sample(own, yarn, crossing, [&](std::size_t i, double) {
+        bend += 2 * heights[i] - heights[(i + 1) % samples] - heights[(i + samples - 1) % samples];
+      });
+      const double sign = lies_above(own, yarn, crossing) ? 1 : -1;
+      own.force[yarn][crossing] = std::max(0.0, sign * own.tension * bend / step_of(own));
+    }
   }
-  for (std::size_t e = static_cast<std::size_t>(end); e < paths.warp.size(); e += step_x) {
-    lower = std::max(lower, sign * paths.weft[static_cast<std::size_t>(pick)].height_at(
-                                       paths.warp[e].across_mm + point.dx));
-  }
-  return upper - lower;
-}
 
-// By how much crests must be taller than `paths` has them. Heights scale with the crests, so each
-// point asks for a smallest factor: needed gap / gap at factor 1. Copies of a crossing ask for the
-// same but for their last bits; the largest counts.
-double crest_factor(const FabricConfig& config, const YarnPaths& paths) {
-  constexpr double kLeastNeed = 1e-9;         // mm
-  constexpr double kMoreThanRounding = 1e-9;  // relative
-  double factor = 1;
-  std::vector<CrossingPoint> points;
-  for_each_crossing_point(config, paths, kSolveSamples, [&](const CrossingPoint& point) {
-    if (point.needed <= kLeastNeed) return;
-    factor = point.gap > 0 ? std::max(factor, point.needed / point.gap) : 2 * kLargestCrestFactor;
-    points.push_back(point);
-  });
-  if (factor > kLargestCrestFactor) return factor;
-  std::erase_if(points, [least = factor * (1 - kMoreThanRounding)](const CrossingPoint& point) {
-    return point.needed / point.gap < least;
-  });
-  for (int pick = 0; pick < config.weave.picks; ++pick) {
-    for (int end = 0; end < config.weave.ends; ++end) {
-      const unsigned kind = kind_of_crossing(config.weave, end, pick);
-      for (const CrossingPoint& point : points) {
-        if (point.kind != kind) continue;
-        factor = std::max(factor,
-                          point.needed / smallest_gap_of_copies(config, paths, end, pick, point));
+  /// Moves the planes until both yarns of every crossing press on each other with the same force.
+  void balance() {
+    const double stiffness =
+        4 * (warp_.tension * static_cast<double>(weft_.count()) / weft_.period +
+             weft_.tension * static_cast<double>(warp_.count()) / warp_.period);
+    double relaxation = kRelaxation;
+    double before = kNothing;
+    for (int round = 0; round < kMostRounds; ++round) {
+      for (System* own : {&warp_, &weft_}) {
+        tbb::parallel_for(std::size_t{0}, own->count(),
+                          [&](std::size_t yarn) { pull(*own, yarn); });
+      }
+      double largest = 0;
+      double imbalance = 0;
+      double mean = 0;
+      for (std::size_t end = 0; end < warp_.count(); ++end) {
+        for (std::size_t pick = 0; pick < weft_.count(); ++pick) {
+          const double by_warp = warp_.force[end][pick];
+          const double by_weft = weft_.force[pick][end];
+          largest = std::max({largest, by_warp, by_weft});
+          imbalance = std::max(imbalance, std::abs(by_warp - by_weft));
+          // The warp pushes down where it lies above.
+          const double sign = lies_above(warp_, end, pick) ? -1 : 1;
+          double& level = plane(warp_, end, pick);
+          level += relaxation * sign * (by_warp - by_weft) / stiffness;
+          mean += level / static_cast<double>(plane_.size());
+        }
+      }
+      if (imbalance <= kBalance * largest) return;
+      // Where little room is left between yarns, the cloth is stiffer than the estimate.
+      relaxation = imbalance > before ? 0.5 * relaxation : std::min(kRelaxation, 1.05 * relaxation);
+      before = imbalance;
+      for (double& level : plane_) level -= mean;
+    }
+  }
+
+  /// Flattens each yarn by the share of the largest force that presses on it.
+  void flatten(System& own) {
+    double largest = 0;
+    for (const std::vector<double>& forces : own.force) {
+      for (const double force : forces) largest = std::max(largest, force);
+    }
+    if (!(largest > 0)) return;
+    for (std::size_t yarn = 0; yarn < own.count(); ++yarn) {
+      for (std::size_t crossing = 0; crossing < crossed_by(own).count(); ++crossing) {
+        own.flatness[yarn][crossing] =
+            1 - own.yield[yarn] * std::min(1.0, own.force[yarn][crossing] / largest);
       }
     }
   }
-  return factor;
+
+  /// Half width and half height of a yarn's section at a distance along it: over the yarns that it
+  /// crosses those of the crossing, between them a blend.
+  std::pair<double, double> section_at(const System& own, std::size_t yarn, double along) const {
+    const System& other = crossed_by(own);
+    const std::size_t n = other.count();
+    const auto after_place = std::upper_bound(other.centre.begin(), other.centre.end(), along);
+    const auto after = static_cast<std::size_t>(after_place - other.centre.begin());
+    const std::size_t before = (after + n - 1) % n;
+    const double begin =
+        other.centre[before] - (after == 0 ? other.period : 0) + other.half_width(before, yarn);
+    const double end = other.centre[after % n] + (after == n ? other.period : 0) -
+                       other.half_width(after % n, yarn);
+    const double share = end > begin ? std::clamp((along - begin) / (end - begin), 0.0, 1.0)
+                                     : (along < begin ? 0.0 : 1.0);
+    const double t = 0.5 - 0.5 * std::cos(kPi * share);
+    const auto blend = [t](double a, double b) { return a + t * (b - a); };
+    return {blend(own.half_width(yarn, before), own.half_width(yarn, after % n)),
+            blend(own.half_height(yarn, before), own.half_height(yarn, after % n))};
+  }
+
+  const Weave& weave_;
+  System warp_;
+  System weft_;
+  std::vector<double> plane_;  // [end][pick] height of the plane between the two yarns
+};
+
+/// The same cloth with other spacings or thicknesses.
+FabricConfig scaled(FabricConfig config, double spacing, double thickness) {
+  config.warp.spacing_mm *= spacing;
+  config.weft.spacing_mm *= spacing;
+  for (YarnConfig& yarn : config.yarns) {
+    yarn.spacing_mm *= spacing;
+    yarn.height_mm *= thickness;
+  }
+  return config;
+}
+
+bool is_jammed(const FabricConfig& config) {
+  Loom loom(config);
+  loom.lay();
+  return loom.steepest_slope() > kSteepestSlope;
+}
+
+/// The factor nearest to 1 between it and `limit` at which the yarns pass, to 1 %; nothing where
+/// that does not do.
+template <class Config>
+std::optional<double> cure(double limit, Config&& config) {
+  if (is_jammed(config(limit))) return {};
+  double bad = 1;
+  double good = limit;
+  while (std::abs(good - bad) > 0.01) {
+    const double middle = 0.5 * (good + bad);
+    (is_jammed(config(middle)) ? bad : good) = middle;
+  }
+  return good;
+}
+
+[[noreturn]] void fail_jammed(const FabricConfig& config, double slope) {
+  std::string message = fmt::format(
+      "the yarns jam: one would have to climb at {:.0f} degrees between its crossings, at most "
+      "{:.0f} "
+      "are possible",
+      degrees(std::atan(slope)), degrees(std::atan(kSteepestSlope)));
+  const auto wider = cure(4, [&](double factor) { return scaled(config, factor, 1); });
+  const auto thinner = cure(0.05, [&](double factor) { return scaled(config, 1, factor); });
+  if (wider)
+    message += fmt::format("; they pass with every spacing_mm {:.2f} times as large", *wider);
+  if (thinner)
+    message += fmt::format("; they pass with every height_mm {:.2f} times as large", *thinner);
+  throw std::invalid_argument(message);
+}
+
+double at_sample(const std::vector<double>& values, std::ptrdiff_t i) {
+  const auto n = static_cast<std::ptrdiff_t>(values.size());
+  return values[static_cast<std::size_t>(((i % n) + n) % n)];
+}
+
+double linear_at(const std::vector<double>& values, double step, double along) {
+  const double u = along / step;
+  const double cell = std::floor(u);
+  const auto i = static_cast<std::ptrdiff_t>(cell);
+  const double a = at_sample(values, i);
+  return a + (u - cell) * (at_sample(values, i + 1) - a);
 }
 
 }  // namespace
 
-double YarnPath::height_at(double along_mm) const {
-  const auto n = static_cast<std::ptrdiff_t>(crest_mm.size());
-  const double u = along_mm / crossing_spacing_mm - 0.5;
-  const double cell = std::floor(u);
-  const auto k = static_cast<std::ptrdiff_t>(cell);
-  const double a = crest_mm[static_cast<std::size_t>(((k % n) + n) % n)];
-  const double b = crest_mm[static_cast<std::size_t>((((k + 1) % n) + n) % n)];
-  return a + (b - a) * 0.5 * (1 - std::cos(kPi * (u - cell)));
+YarnPlaces warp_places(const FabricConfig& config) {
+  return places(config, config.warp, config.weave.ends * config.repeats_x);
 }
 
-CentreLine centre_line(const YarnPath& path, double width_mm, double height_mm) {
+YarnPlaces weft_places(const FabricConfig& config) {
+  return places(config, config.weft, config.weave.picks * config.repeats_y);
+}
+
+double YarnShape::height_at(double along_mm) const {
+  // A cubic through the samples with the slopes of their neighbours (Catmull and Rom).
+  const double u = along_mm / step_mm;
+  const double cell = std::floor(u);
+  const auto i = static_cast<std::ptrdiff_t>(cell);
+  const double t = u - cell;
+  const double p0 = at_sample(height_mm, i - 1);
+  const double p1 = at_sample(height_mm, i);
+  const double p2 = at_sample(height_mm, i + 1);
+  const double p3 = at_sample(height_mm, i + 2);
+  return p1 +
+         0.5 * t * (p2 - p0 + t * (2 * p0 - 5 * p1 + 4 * p2 - p3 + t * (3 * (p1 - p2) + p3 - p0)));
+}
+
+double YarnShape::half_width_at(double along_mm) const {
+  return linear_at(half_width_mm, step_mm, along_mm);
+}
+
+double YarnShape::half_height_at(double along_mm) const {
+  return linear_at(half_height_mm, step_mm, along_mm);
+}
+
+double YarnShape::crimp() const {
+  double sum = 0;
+  for (std::size_t i = 0; i < height_mm.size(); ++i)
+    sum += std::hypot(step_mm, height_mm[(i + 1) % height_mm.size()] - height_mm[i]);
+  return sum / (step_mm * static_cast<double>(height_mm.size())) - 1;
+}
+
+CentreLine centre_line(const YarnPath& path) {
   // side x up is the direction of the yarn.
   const Vec3d along = path.is_warp ? Vec3d(0, 1, 0) : Vec3d(1, 0, 0);
   const Vec3d across = path.is_warp ? Vec3d(1, 0, 0) : Vec3d(0, 1, 0);
   const Vec3d side = path.is_warp ? Vec3d(-1, 0, 0) : across;
-  const double length = path.length_mm();
   return {[=](double share) {
-            const Vec3d position = path.across_mm * across + share * length * along +
-                                   path.height_at(share * length) * Vec3d(0, 0, 1);
-            return YarnPlace{position, side, Vec3d(0, 0, 1), 0.5 * width_mm, 0.5 * height_mm};
+            const double s = share * path.length_mm;
+            const Vec3d position =
+                path.across_mm * across + s * along + path.shape->height_at(s) * Vec3d(0, 0, 1);
+            return YarnPlace{position, side, Vec3d(0, 0, 1), path.shape->half_width_at(s),
+                             path.shape->half_height_at(s)};
           },
-          length};
+          path.length_mm};
 }
 
 YarnPaths lay_yarns(const FabricConfig& config) {
-  const int ends = config.weave.ends * config.repeats_x;
-  const int picks = config.weave.picks * config.repeats_y;
-  YarnPaths paths;
-  paths.width_mm = ends * config.warp.spacing_mm;
-  paths.height_mm = picks * config.weft.spacing_mm;
-  const double touching = 0.5 * (config.warp_yarn(0).height_mm + config.weft_yarn(0).height_mm);
-  for (int end = 0; end < ends; ++end) {
-    YarnPath yarn{true, (end + 0.5) * config.warp.spacing_mm, config.weft.spacing_mm, picks, {}};
-    for (int pick = 0; pick < config.weave.picks; ++pick) {
-      yarn.crest_mm.push_back((config.weave.is_warp_up(end, pick) ? 1 : -1) * config.crimp_warp *
-                              touching);
-    }
-    paths.warp.push_back(std::move(yarn));
+  const double ends = std::lcm(config.weave.ends, static_cast<int>(config.warp.sequence.size()));
+  const double picks = std::lcm(config.weave.picks, static_cast<int>(config.weft.sequence.size()));
+  if (ends * picks > kMostCrossings) {
+    throw std::invalid_argument(fmt::format(
+        "a repeat of {} ends x {} picks has {:.3g} crossings, at most {:.3g} can be laid "
+        "as one tile: make the pattern of a few base weaves, one fabric each",
+        ends, picks, ends * picks, kMostCrossings));
   }
-  for (int pick = 0; pick < picks; ++pick) {
-    YarnPath yarn{false, (pick + 0.5) * config.weft.spacing_mm, config.warp.spacing_mm, ends, {}};
-    for (int end = 0; end < config.weave.ends; ++end) {
-      yarn.crest_mm.push_back((config.weave.is_warp_up(end, pick) ? -1 : 1) *
-                              (1 - config.crimp_warp) * touching);
-    }
-    paths.weft.push_back(std::move(yarn));
-  }
+  Loom loom(config);
+  loom.lay();
+  if (const double slope = loom.steepest_slope(); slope > kSteepestSlope)
+    fail_jammed(config, slope);
 
-  double factor = crest_factor(config, paths);
-  if (factor > kLargestCrestFactor) {
-    throw std::invalid_argument(
-        "warp and weft cannot pass each other without overlapping: make width_mm smaller against "
-        "spacing_mm");
-  }
-  factor *= kGridAllowance;
-  for (auto* system : {&paths.warp, &paths.weft}) {
-    for (YarnPath& yarn : *system) {
-      for (double& crest : yarn.crest_mm) crest *= factor;
-    }
-  }
+  const YarnPlaces warp = warp_places(config);
+  const YarnPlaces weft = weft_places(config);
+  YarnPaths paths;
+  paths.width_mm = warp.period_mm;
+  paths.height_mm = weft.period_mm;
+  const auto add = [&](bool is_warp, const YarnPlaces& own, double length_mm,
+                       std::vector<YarnPath>& system) {
+    const std::vector<std::shared_ptr<const YarnShape>> shapes = loom.shapes(is_warp);
+    for (std::size_t k = 0; k < own.centre_mm.size(); ++k)
+      system.push_back({is_warp, own.centre_mm[k], length_mm, shapes[k % shapes.size()]});
+  };
+  add(true, warp, weft.period_mm, paths.warp);
+  add(false, weft, warp.period_mm, paths.weft);
   return paths;
 }
 
 double smallest_clearance(const FabricConfig& config, const YarnPaths& paths, int samples) {
-  double smallest = std::numeric_limits<double>::infinity();
-  for_each_crossing_point(config, paths, samples, [&](const CrossingPoint& point) {
-    smallest = std::min(smallest, point.gap - point.needed);
-  });
+  const auto ends = static_cast<std::size_t>(config.weave.ends);
+  const auto picks = static_cast<std::size_t>(config.weave.picks);
+  double smallest = kNothing;
+  for (std::size_t end = 0; end < ends; ++end) {
+    for (std::size_t pick = 0; pick < picks; ++pick) {
+      const YarnPath& warp = paths.warp[end];
+      const YarnPath& weft = paths.weft[pick];
+      const double sign =
+          config.weave.is_warp_up(static_cast<int>(end), static_cast<int>(pick)) ? 1 : -1;
+      const double width = warp.shape->half_width_at(weft.across_mm);
+      const double depth = weft.shape->half_width_at(warp.across_mm);
+      for (int iy = 0; iy < samples; ++iy) {
+        const double dy = depth * (2.0 * iy / (samples - 1) - 1);
+        for (int ix = 0; ix < samples; ++ix) {
+          const double dx = width * (2.0 * ix / (samples - 1) - 1);
+          const double y = weft.across_mm + dy;
+          const double x = warp.across_mm + dx;
+          const double gap = sign * (warp.shape->height_at(y) - weft.shape->height_at(x));
+          const double needed =
+              section(dx, warp.shape->half_width_at(y), warp.shape->half_height_at(y)) +
+              section(dy, weft.shape->half_width_at(x), weft.shape->half_height_at(x));
+          smallest = std::min(smallest, gap - needed);
+        }
+      }
+    }
+  }
   return smallest;
 }
 

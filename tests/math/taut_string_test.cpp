@@ -21,8 +21,11 @@ void expect_taut(const std::vector<double>& floor, const std::vector<double>& ce
     ASSERT_GE(heights[i], floor[i] - 1e-12);
     ASSERT_LE(heights[i], ceiling[i] + 1e-12);
     const double bend = heights[(i + n - 1) % n] + heights[(i + 1) % n] - 2 * heights[i];
-    if (bend < -1e-9) ASSERT_NEAR(heights[i], floor[i], 1e-9) << i;
-    if (bend > 1e-9) ASSERT_NEAR(heights[i], ceiling[i], 1e-9) << i;
+    if (bend < -1e-9) {
+      ASSERT_NEAR(heights[i], floor[i], 1e-9) << i;
+    } else if (bend > 1e-9) {
+      ASSERT_NEAR(heights[i], ceiling[i], 1e-9) << i;
+    }
   }
 }
 
