@@ -140,7 +140,10 @@ Report fabric_report(const FabricDocument& fabric) {
       describe_curves(*config.curves, config, report);
     } else {
       report["weave"] = config.weave.notation;
-      describe_weave(config.weave, report);
+      Weave crossings = config.weave;
+      // What a draft says of its threads is not what the config makes of them.
+      crossings.warp = crossings.weft = {};
+      describe_weave(crossings, report);
       describe_threads(config, lay_yarns(config), report);
     }
     for (const YarnConfig& yarn : config.yarns)
