@@ -342,8 +342,8 @@ class ObjLines {
     const auto count = static_cast<std::int64_t>(vertices_.size());
     if (word.empty() || error != std::errc() || end != word.data() + word.size() || written == 0 ||
         written > count || written < -count)
-      fail(fmt::format("a line's vertex: expected a number from 1 to {}, or -1 to -{}, found '{}'",
-                       count, count, word.substr(0, 20)));
+      fail(fmt::format("a line's vertex: expected a number from 1 to {}, or -1 to -{}, found {}",
+                       count, count, quoted_excerpt(word)));
     return static_cast<std::size_t>(written > 0 ? written - 1 : count + written);
   }
 

@@ -1,5 +1,6 @@
 #include "formats/utf8_text.h"
 
+#include <algorithm>
 #include <cstdint>
 
 namespace heddle {
@@ -40,6 +41,20 @@ std::string utf8_of(std::string_view text) {
     }
   }
   return result;
+}
+
+std::string quoted_excerpt(std::string_view text) {
+  std::size_t shown = std::min<std::size_t>(text.size(), 30);
+  // Whole characters, where the text is UTF-8.
+  const auto continues = [&](std::size_t at) {
+    return at < text.size() && (static_cast<unsigned char>(text[at]) & 0xC0) == 0x80;
+  };
+  for (int k = 0; k < 3 && shown > 0 && continues(shown); ++k) --shown;
+  std::string excerpt = utf8_of(text.substr(0, shown));
+  for (char& c : excerpt) {
+    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = '?';
+  }
+  return "'" + excerpt + (text.size() > shown ? "...'" : "'");
 }
 
 }  // namespace heddle

@@ -54,18 +54,6 @@ std::string_view without_comment(std::string_view value) {
   return trimmed(value.substr(0, value.find(';')));
 }
 
-std::string in_quotes(std::string_view text) {
-  std::size_t shown_bytes = std::min<std::size_t>(text.size(), 30);
-  while (shown_bytes < text.size() &&
-         (static_cast<unsigned char>(text[shown_bytes]) & 0xC0) == 0x80)
-    --shown_bytes;  // whole characters
-  std::string shown = utf8_of(text.substr(0, shown_bytes));
-  for (char& c : shown) {
-    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = '?';
-  }
-  return "'" + shown + (text.size() > shown_bytes ? "...'" : "'");
-}
-
 /// A table of bits: which shafts each treadle, pick or end takes.
 class ShaftSets {
  public:
@@ -191,7 +179,7 @@ class WifReader {
       const std::size_t sign = text.find('=');
       if (sign == std::string_view::npos) {
         if (!is_text)
-          warn(line, fmt::format("left out: expected KEY=VALUE, found {}", in_quotes(text)));
+          warn(line, fmt::format("left out: expected KEY=VALUE, found {}", quoted_excerpt(text)));
         continue;
       }
       section->entries.push_back(
@@ -205,7 +193,7 @@ class WifReader {
     if (close != std::string_view::npos && without_comment(text.substr(close + 1)).empty())
       return true;
     if (is_text && !sections_.empty()) return false;
-    fail(line, fmt::format("expected [SECTION] alone on its line, found {}", in_quotes(text)));
+    fail(line, fmt::format("expected [SECTION] alone on its line, found {}", quoted_excerpt(text)));
   }
 
   const WifSection& section(const std::string& name) const {
@@ -244,7 +232,7 @@ class WifReader {
     const std::optional<long long> value = parse_integer(trimmed(text));
     if (!value || *value < min || *value > max) {
       fail(line, fmt::format("expected {} from {} to {}, found {}", what, min, max,
-                             in_quotes(trimmed(text))));
+                             quoted_excerpt(trimmed(text))));
     }
     return static_cast<int>(*value);
   }
@@ -279,8 +267,8 @@ class WifReader {
     for (const char* word : {"false", "off", "no", "0", ""}) {
       if (value == word) return false;
     }
-    fail(entry.line,
-         fmt::format("expected true, on, yes, 1, false, off, no or 0, found {}", in_quotes(value)));
+    fail(entry.line, fmt::format("expected true, on, yes, 1, false, off, no or 0, found {}",
+                                 quoted_excerpt(value)));
   }
 
   bool is_listed(std::string_view name) {
@@ -419,7 +407,7 @@ class WifReader {
     if (const WifEntry* form = find("color palette", "form")) {
       const std::string value = lower_case(without_comment(form->value));
       if (!value.empty() && value != "rgb")
-        fail(form->line, fmt::format("expected Form=RGB, found {}", in_quotes(value)));
+        fail(form->line, fmt::format("expected Form=RGB, found {}", quoted_excerpt(value)));
     }
     if (const WifEntry* range = find("color palette", "range")) {
       const std::vector<int> bounds = integers(*range, "a bound of 'range'", 0, 65535);
@@ -542,7 +530,7 @@ class WifReader {
     if (unit == "inches") return kMmPerInch;
     if (unit == "centimeters" || unit == "centimetres") return 10;
     fail(entry->line,
-         fmt::format("expected Decipoints, Inches or Centimeters, found {}", in_quotes(unit)));
+         fmt::format("expected Decipoints, Inches or Centimeters, found {}", quoted_excerpt(unit)));
   }
 
   /// Millimetres of each thread, or nothing where they are not stated for all.
@@ -580,7 +568,7 @@ class WifReader {
     if (is_number && value == 0) return 0;
     if (!is_number || !(mm >= 1e-3 && mm <= 100)) {
       fail(entry.line,
-           fmt::format("expected a {} from 0.001 to 100 mm, found {}", what, in_quotes(text)));
+           fmt::format("expected a {} from 0.001 to 100 mm, found {}", what, quoted_excerpt(text)));
     }
     return mm;
   }

@@ -129,6 +129,13 @@ struct ChartOptions {
 /// run failed.
 int chart_command(const ChartOptions& options, const CommonOptions& common);
 
+struct ExportOptions {
+  std::filesystem::path input;   // fabric .toml, fibers .safetensors, or pack
+  std::filesystem::path output;  // .hair, .bcc or .obj
+};
+/// Writes the fibers of a tile as curves in millimetres, each over one period, from end to end.
+int export_command(const ExportOptions& options, const CommonOptions& common);
+
 /// Prints what a file holds.
 int info_command(const std::filesystem::path& path, const CommonOptions& common);
 

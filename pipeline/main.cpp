@@ -66,6 +66,7 @@ struct Options {
   RunOptions run;
   SwatchOptions swatch;
   CatalogueOptions catalogue;
+  ExportOptions curves;
   PlanOptions plan;
 };
 
@@ -152,6 +153,7 @@ const char* kept_after_signal(const std::string& command) {
       {"check", kNothing},
       {"compare", kNothing},
       {"eval", "the answers printed so far are complete"},
+      {"export", kNothing},
       {"info", kNothing},
       {"pack", kStages},
       {"plan", kMeasurement},
@@ -366,10 +368,26 @@ void add_info(CLI::App& app, Options& options, Actions& actions) {
   add_fabric_seed(*info, options);
   info->add_option(
           "PATH", options.path,
-          "Fabric or scene .toml, pack, .safetensors, .vdb, .exr, .hdr, .png, .obj, or one of "
-          "our .json files")
+          "Fabric or scene .toml, pack, draft .wif, curves .bcc, .hair and .obj, .safetensors, "
+          ".vdb, .exr, .hdr, .png, .obj, or one of our .json files")
       ->required();
   actions["info"] = [&options] { return info_command(options.path, options.common); };
+}
+
+void add_export(CLI::App& app, Options& options, Actions& actions) {
+  CLI::App* command = app.add_subcommand(
+      "export", "The fibers of a tile as curves in millimetres, for other programs");
+  add_common(*command, options);
+  add_fabric_seed(*command, options);
+  command
+      ->add_option("INPUT", options.curves.input,
+                   "Fabric .toml, its fibers .safetensors, or a pack")
+      ->required();
+  command
+      ->add_option("-o,--output,--outfile", options.curves.output,
+                   "File .hair, .bcc or .obj (lines)")
+      ->required();
+  actions["export"] = [&options] { return export_command(options.curves, options.common); };
 }
 
 void add_check(CLI::App& app, Options& options, Actions& actions) {
@@ -392,6 +410,7 @@ Actions add_commands(CLI::App& app, Options& options) {
   add_compare(app, options, actions);
   add_plan(app, options, actions);
   add_chart(app, options, actions);
+  add_export(app, options, actions);
   add_info(app, options, actions);
   add_check(app, options, actions);
   return actions;

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "fibers/cloth/weave_config.h"
+#include "formats/memory_need.h"
 
 namespace heddle {
 namespace {
@@ -80,6 +81,11 @@ std::vector<double> read_widths(const TomlTable& section, const char* key, int y
 WovenPattern::WovenPattern(const Weave& weave, const std::vector<double>& end_widths,
                            const std::vector<double>& pick_widths)
     : x_(edges_of(end_widths)), y_(edges_of(pick_widths)) {
+  const auto crossings =
+      static_cast<std::uint64_t>(weave.ends) * static_cast<std::uint64_t>(weave.picks);
+  // A list that grows holds its old items as well while it moves.
+  require_memory(crossings * (sizeof(int) + 3 * sizeof(WovenFloat)),
+                 fmt::format("a surface of {} x {} crossings", weave.ends, weave.picks));
   repeat_ = {x_.back(), y_.back()};
   float_at_.assign(static_cast<std::size_t>(weave.ends) * static_cast<std::size_t>(weave.picks),
                    -1);

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <initializer_list>
+#include <string>
 
 namespace heddle {
 namespace {
@@ -20,6 +21,16 @@ TEST(Utf8Text, OtherBytesAreLatin1) {
   EXPECT_EQ(utf8_of("K\xf6per"), "K\xc3\xb6per");
   EXPECT_EQ(utf8_of("K\xc3\xb6per"), "K\xc3\xb6per");
   EXPECT_TRUE(is_utf8(utf8_of("\x80\xff\xfe")));
+}
+
+TEST(Utf8Text, ExcerptsAreShortAndPrintable) {
+  EXPECT_EQ(quoted_excerpt("a\tb"), "'a?b'");
+  EXPECT_EQ(quoted_excerpt(std::string(40, 'x')), "'" + std::string(30, 'x') + "...'");
+  EXPECT_EQ(quoted_excerpt("K\xf6per"), "'K\xc3\xb6per'");
+  // A character of two bytes is not cut in two.
+  EXPECT_EQ(quoted_excerpt(std::string(29, 'x') + "\xc3\xb6y"),
+            "'" + std::string(29, 'x') + "...'");
+  EXPECT_TRUE(is_utf8(quoted_excerpt(std::string(50, '\xaf'))));
 }
 
 }  // namespace
