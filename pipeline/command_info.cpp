@@ -47,8 +47,16 @@ Report describe_scene(const TomlTable& document) {
   report["method"] = render_method_name(scene.method);
   report["lights"] = scene.lights.size();
   Report fabrics = Report::array();
-  for (const ClothConfig& cloth : scene.cloths)
-    fabrics.push_back(cloth.surface ? cloth.surface->name : cloth.fabric.string());
+  for (std::size_t k = 0; k < scene.cloths.size(); ++k) {
+    const ClothConfig& cloth = scene.cloths[k];
+    if (cloth.surface) fabrics.push_back(cloth.surface->name);
+    for (const fs::path& file : fabric_files(cloth)) fabrics.push_back(file.string());
+    if (cloth.pattern) {
+      report[fmt::format("cloth {} pattern", k + 1)] = fmt::format(
+          "{} x {} blocks of {} fabrics: {}", cloth.pattern->columns, cloth.pattern->rows,
+          cloth.pattern->fabrics.size(), cloth.pattern->picture.string());
+    }
+  }
   report["fabrics"] = fabrics;
   return report;
 }

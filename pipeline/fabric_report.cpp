@@ -13,6 +13,7 @@
 #include "fibers/cloth/yarn_paths.h"
 #include "fibers/tracing/tile_scene.h"
 #include "formats/input_error.h"
+#include "pipeline/draft_report.h"
 
 namespace heddle {
 namespace {
@@ -138,7 +139,7 @@ Report fabric_report(const FabricDocument& fabric) {
     } else if (config.curves) {
       describe_curves(*config.curves, config, report);
     } else {
-      report["weave"] = config.weave.notation;
+      describe_weave(config.weave, report);
       describe_threads(config, lay_yarns(config), report);
     }
     for (const YarnConfig& yarn : config.yarns)

@@ -10,6 +10,8 @@
 #include "formats/atomic_file.h"
 #include "formats/content_hash.h"
 #include "formats/input_error.h"
+#include "pipeline/border_sample.h"
+#include "pipeline/cloth_layout.h"
 #include "pipeline/interrupt.h"
 #include "pipeline/version.h"
 #include "render/cloth_scene.h"
@@ -67,7 +69,7 @@ SceneVariant variant_of_fabrics(const SceneConfig& scene, const SceneVariant::Of
   SceneVariant variant;
   if (of_each == SceneVariant::OfFabric{}) return variant;
   for (const ClothConfig& cloth : scene.cloths) {
-    if (!cloth.surface) variant.fabrics[cloth.fabric] = of_each;
+    for (const fs::path& file : fabric_files(cloth)) variant.fabrics[file] = of_each;
   }
   return variant;
 }
@@ -81,7 +83,7 @@ SceneVariant variant_of_order(const fs::path& scene_file, std::optional<int> ord
 struct SceneJob::Loaded {
   std::map<fs::path, FabricPack> packs;  // by fabric file
   std::map<fs::path, std::shared_ptr<const TileScene>> tiles;
-  std::vector<const FabricPack*> cloth_packs;  // [cloth of fibers]
+  std::vector<const FabricPack*> part_packs;  // [part of the scene]
   std::unique_ptr<ClothScene> scene;
   std::vector<BcsdfTable> materials;                                   // of the scene
   std::vector<Warning> warnings;                                       // of the packs
@@ -103,13 +105,56 @@ SceneJob::SceneJob(const fs::path& scene_file, StageContext& context, const Scen
       cloth.surface_method = *variant.surface_method;
     }
   }
-  for (const ClothConfig& cloth : config_.cloths) {
-    if (cloth.surface) continue;
-    auto& stages = fabrics_[cloth.fabric];
-    if (!stages)
-      stages =
-          std::make_unique<FabricStages>(cloth.fabric, context, variant.of(cloth.fabric).variant);
+  for (ClothConfig& cloth : config_.cloths) {
+    if (cloth.pattern && cloth.pattern->borders == PatternBorders::kWoven && !cloth.surface) {
+      layouts_.push_back(weave_borders(cloth, scene_file));
+      continue;
+    }
+    std::vector<const FabricConfig*> fabrics;
+    for (const fs::path& file : fabric_files(cloth)) {
+      auto& stages = fabrics_[file];
+      if (!stages) stages = std::make_unique<FabricStages>(file, context, variant.of(file).variant);
+      fabrics.push_back(&stages->document().config);
+    }
+    layouts_.push_back(block_layout(cloth, fabrics, scene_file.string()));
   }
+}
+
+BlockLayout SceneJob::weave_borders(ClothConfig& cloth, const fs::path& scene_file) {
+  PatternConfig& pattern = *cloth.pattern;
+  std::vector<FabricDocument> documents;
+  for (const fs::path& file : pattern.fabrics) {
+    documents.push_back(
+        read_fabric_document(file, context_->fabric_seed, variant_.of(file).variant));
+  }
+  std::vector<const FabricDocument*> pointers;
+  std::vector<const FabricConfig*> fabrics;
+  for (const FabricDocument& document : documents) {
+    pointers.push_back(&document);
+    fabrics.push_back(&document.config);
+  }
+  BlockLayout layout = *block_layout(cloth, fabrics, scene_file.string());
+  BlockMap map{layout.columns, layout.rows, {}};
+  for (const BlockLayout::Block& block : layout.pattern)
+    map.fabric.push_back(static_cast<std::uint16_t>(block.exemplar));
+  const BorderSample sample = choose_border_sample(map, pattern.sample_blocks, layout.seed);
+  FabricDocument woven = woven_sample(sample.map, pointers, cloth.blocks->size_repeats);
+  context_->console->say(fmt::format(
+      "{}: {} x {} blocks; {:.0f} % of the pattern's blocks find all eight neighbours in it, "
+      "{:.0f} % the nearest four",
+      woven.config.name, sample.map.columns, sample.map.rows, 100 * sample.eight_fit,
+      100 * sample.four_fit));
+  // Known by a name of its own: its weave is that of this cloth.
+  woven.file = fmt::format("{}, woven for cloth {}", woven.file.string(), layouts_.size() + 1);
+  pattern.fabrics = {woven.file};
+  cloth.fabric = woven.file;
+  layout.tile_blocks = {{sample.map.columns, sample.map.rows}};
+  for (std::size_t k = 0; k < layout.pattern.size(); ++k)
+    layout.pattern[k] = {0, sample.block[k][0], sample.block[k][1]};
+  variant_.fabrics.try_emplace(woven.file, variant_.of(documents.front().file));
+  auto& stages = fabrics_[woven.file];
+  stages = std::make_unique<FabricStages>(std::move(woven), *context_);
+  return layout;
 }
 
 SceneJob::~SceneJob() = default;
@@ -170,8 +215,8 @@ SceneJob::Fabrics& SceneJob::fabrics_for(RenderMethod method) {
   if (!method_row(method).as_printed) return fabrics_;
   if (printed_fabrics_.empty()) {
     for (const auto& [file, stages] : fabrics_) {
-      printed_fabrics_[file] = std::make_unique<FabricStages>(
-          file, *context_, variant_.of(file).variant, BakeChoices::kPrinted);
+      printed_fabrics_[file] =
+          std::make_unique<FabricStages>(stages->document(), *context_, BakeChoices::kPrinted);
     }
   }
   return printed_fabrics_;
@@ -196,6 +241,7 @@ std::string SceneJob::picture_key(const PictureRequest& request) {
   for (const ClothConfig& cloth : config_.cloths) {
     if (cloth.mesh) values.emplace_back("mesh", content_hash_of_file(cloth.mesh->path));
     if (cloth.surface) values.emplace_back("surface", cloth.surface->text);
+    if (cloth.pattern) values.emplace_back("pattern", content_hash_of_file(cloth.pattern->picture));
   }
   for (const std::string& surface : surface_stages().keys())
     values.emplace_back("interactive", surface);
@@ -226,21 +272,29 @@ const SceneJob::Loaded& SceneJob::loaded_for(RenderMethod method) {
     loaded->packs.emplace(file, load_pack(artifacts[k++].path));
     loaded->tiles[file] = std::make_shared<const TileScene>(loaded->packs.at(file).exemplar);
   }
-  std::vector<std::shared_ptr<const TileScene>> tiles;
-  for (const ClothConfig& cloth : config_.cloths) {
-    if (cloth.surface) continue;
-    const FabricPack& pack = loaded->packs.at(cloth.fabric);
-    loaded->cloth_packs.push_back(&pack);
-    // In the order of ClothScene::materials: of each tile once.
-    const std::shared_ptr<const TileScene>& tile = loaded->tiles.at(cloth.fabric);
-    if (std::find(tiles.begin(), tiles.end(), tile) == tiles.end()) {
-      loaded->materials.insert(loaded->materials.end(), pack.materials.begin(),
-                               pack.materials.end());
+  std::vector<ClothTiling> tilings;
+  std::set<fs::path> seen;
+  for (std::size_t cloth = 0; cloth < config_.cloths.size(); ++cloth) {
+    std::vector<ClothTiling::Tile> tiles;
+    for (const fs::path& file : fabric_files(config_.cloths[cloth])) {
+      const FabricPack& pack = loaded->packs.at(file);
+      loaded->part_packs.push_back(&pack);
+      tiles.push_back(loaded->tiles.at(file));
+      // In the order of ClothScene::materials: of each fabric once.
+      if (seen.insert(file).second) {
+        loaded->materials.insert(loaded->materials.end(), pack.materials.begin(),
+                                 pack.materials.end());
+      }
     }
-    tiles.push_back(tile);
+    if (tiles.empty()) continue;
+    if (layouts_[cloth]) {
+      tilings.emplace_back(std::move(tiles), *layouts_[cloth]);
+    } else {
+      tilings.emplace_back(tiles.front());
+    }
   }
   // cannot be moved: built in place
-  loaded->scene.reset(new ClothScene(make_cloth_scene(config_, tiles)));
+  loaded->scene.reset(new ClothScene(make_cloth_scene(config_, tilings)));
   for (const auto& [file, pack] : loaded->packs) {
     for (Warning& warning : pack_warnings(pack, *loaded->tiles.at(file)))
       loaded->warnings.push_back(std::move(warning));
@@ -279,7 +333,7 @@ std::unique_ptr<SceneJob::Shading> SceneJob::shading_for(const PictureRequest& r
                                      .blend = blend_for(request.method),
                                      .transfer_order = transfer_order,
                                      .interactive = loaded.interactive};
-  shading->renderer.emplace(*loaded.scene, loaded.cloth_packs, config_.lights, config_.background,
+  shading->renderer.emplace(*loaded.scene, loaded.part_packs, config_.lights, config_.background,
                             settings);
   return shading;
 }
@@ -320,8 +374,8 @@ PictureResult SceneJob::render(const PictureRequest& request, const std::string&
   const Loaded& loaded = loaded_for(request.method);
   const Camera camera(request.camera);
 
-  PictureSetup setup{loaded.scene.get(), loaded.cloth_packs, config_.lights,           &camera,
-                     request.crop,       request.method,     blend_for(request.method)};
+  PictureSetup setup{loaded.scene.get(), loaded.part_packs, config_.lights,           &camera,
+                     request.crop,       request.method,    blend_for(request.method)};
   setup.interactive_surfaces = !traces_paths(request.method) && !surface_stages().keys().empty();
   std::vector<Warning> warnings = loaded.warnings;
   const auto add_warnings = [&](std::vector<Warning>&& more) {

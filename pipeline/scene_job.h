@@ -127,6 +127,8 @@ class SceneJob {
   struct Shading;
   /// The variant's, but the paper's own for `printed`.
   VisibilityBlend blend_for(RenderMethod method) const;
+  /// Puts the sample of its pattern in the place of the cloth's fabrics.
+  BlockLayout weave_borders(ClothConfig& cloth, const std::filesystem::path& scene_file);
   Needs needs_for(RenderMethod method, const std::filesystem::path& fabric) const;
   std::unique_ptr<Shading> shading_for(const PictureRequest& request,
                                        std::optional<int> transfer_order = {});
@@ -142,6 +144,7 @@ class SceneJob {
   StageContext* context_;
   SceneVariant variant_;
   Fabrics fabrics_;
+  std::vector<std::optional<BlockLayout>> layouts_;  // [cloth]
   std::optional<SurfaceStages> surface_stages_;
   Fabrics printed_fabrics_;  // the same, baked as printed; empty until a picture needs them
   std::map<RenderMethod, std::unique_ptr<Loaded>> loaded_;

@@ -175,12 +175,15 @@ FabricDocument read_fabric_document(const fs::path& path, std::optional<std::uin
 
 FabricStages::FabricStages(const fs::path& fabric_file, StageContext& context,
                            const FabricVariant& variant, BakeChoices choices)
-    : document_(read_fabric_document(fabric_file, context.fabric_seed, variant)),
-      context_(&context) {
+    : FabricStages(read_fabric_document(fabric_file, context.fabric_seed, variant), context,
+                   choices) {}
+
+FabricStages::FabricStages(FabricDocument document, StageContext& context, BakeChoices choices)
+    : document_(std::move(document)), context_(&context) {
   if (choices == BakeChoices::kShipped) return;
   if (document_.config.light_from_both_sides) {
     throw ConfigError(
-        fabric_file.string() +
+        document_.file.string() +
         ": the printed axes lie above the horizon, and this fabric takes light from both sides");
   }
   origin_choice_ = OriginChoice::kMidpoint;

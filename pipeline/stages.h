@@ -165,6 +165,9 @@ class FabricStages {
   /// sides.
   FabricStages(const std::filesystem::path& fabric_file, StageContext& context,
                const FabricVariant& variant = {}, BakeChoices choices = BakeChoices::kShipped);
+  /// Of a fabric that no file states: it has no accuracy table.
+  FabricStages(FabricDocument document, StageContext& context,
+               BakeChoices choices = BakeChoices::kShipped);
   ~FabricStages();
 
   const FabricDocument& document() const { return document_; }

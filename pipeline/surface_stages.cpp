@@ -41,6 +41,14 @@ std::string geometry_text(const SceneConfig& config,
       shape["flat_mm"] = {cloth.flat_width_mm, cloth.flat_height_mm};
     }
     if (!cloth.surface) shape["fibers"] = geometry_key(cloth.fabric);
+    if (cloth.pattern) {
+      for (const fs::path& file : cloth.pattern->fabrics)
+        shape["pattern"].push_back(geometry_key(file));
+    }
+    if (cloth.yarn_drift) {
+      const YarnDriftConfig& drift = *cloth.yarn_drift;
+      shape["yarn_drift"] = {drift.spacing_rms, drift.across_mm, drift.along_mm, drift.seed};
+    }
     cloths.push_back(shape);
   }
   nlohmann::json meshes = nlohmann::json::array();

@@ -132,7 +132,7 @@ Probe probe_of(const PictureSetup& setup) {
       const std::optional<ShellHit> hit = scene.first_fiber(scene_ray);
       if (!hit) continue;
       ++probe.hits;
-      const Exemplar& exemplar = scene.exemplar(hit->cloth);
+      const Exemplar& exemplar = scene.exemplar(hit->part);
       const double pixel = ray.spread * hit->t;
       probe.pixel_radii.push_back(pixel / exemplar.radius_mm[exemplar.segment_fiber[hit->segment]]);
       probe.repeats.push_back(pixel / std::max(exemplar.width_mm, exemplar.height_mm));
@@ -145,7 +145,7 @@ Probe probe_of(const PictureSetup& setup) {
                             l);
         const Vec3 direction = sample_light(setup.lights[l], random).direction;
         const float height_of_light = scene.fabric_direction(*hit, direction).z();
-        if (setup.packs[hit->cloth]->light_from_both_sides) {
+        if (setup.packs[hit->part]->light_from_both_sides) {
           if (std::abs(height_of_light) < std::sin(radians(kPlaneDegrees))) ++probe.in_plane[l];
         } else if (height_of_light <= 0 &&
                    scene.globally_visible(scene.surface_point(*hit, ClothSide::kBack), direction)) {

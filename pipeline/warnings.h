@@ -88,7 +88,7 @@ PackFacts pack_facts(const FabricPack& pack, const TileScene& tile);
 /// Of the pack alone.
 std::vector<Warning> pack_warnings(const FabricPack& pack, const TileScene& tile);
 
-/// A picture about to be made. packs: [cloth of fibers]; empty where paths are traced.
+/// A picture about to be made. packs: [part of the scene]; empty where paths are traced.
 struct PictureSetup {
   const ClothScene* scene;
   std::span<const FabricPack* const> packs;

@@ -16,14 +16,14 @@ constexpr double kUnderlayGap = 1e-2;
 // Start of shadow rays above a shell or a mesh: some 30 times the rounding of a float at 300 mm.
 constexpr double kLiftMm = 1e-3;
 
-double thickness(const Exemplar& exemplar) {
-  return static_cast<double>(exemplar.z_max) - static_cast<double>(exemplar.z_min);
+double thickness(const ClothTiling& tiling) {
+  return static_cast<double>(tiling.z_max()) - static_cast<double>(tiling.z_min());
 }
 
-Shell make_shell(const ClothMesh& mesh, const Exemplar& exemplar) {
-  const double margin = kShellMargin * thickness(exemplar);
-  return Shell(mesh, static_cast<double>(exemplar.z_min) - margin,
-               static_cast<double>(exemplar.z_max) + margin);
+Shell make_shell(const ClothMesh& mesh, const ClothTiling& tiling) {
+  const double margin = kShellMargin * thickness(tiling);
+  return Shell(mesh, static_cast<double>(tiling.z_min()) - margin,
+               static_cast<double>(tiling.z_max()) + margin);
 }
 
 ClothMesh read_cloth_mesh(const MeshFile& file, double uv_size_mm) {
@@ -60,17 +60,21 @@ ClothScene::ClothScene(std::vector<ClothPiece> pieces, std::vector<TriangleMesh>
         std::vector<Cloth> cloths;
         std::map<const TileScene*, std::uint16_t> offsets;
         for (ClothPiece& piece : pieces) {
-          const Exemplar& exemplar = piece.tile->exemplar();
-          const auto [place, is_new] =
-              offsets.try_emplace(piece.tile.get(), static_cast<std::uint16_t>(materials_.size()));
-          if (is_new) {
-            materials_.insert(materials_.end(), exemplar.scattering.begin(),
-                              exemplar.scattering.end());
+          const auto first_part = static_cast<std::uint32_t>(parts_.size());
+          for (const ClothTiling::Tile& tile : piece.tiling.tiles()) {
+            const std::vector<FiberScattering>& scattering = tile->exemplar().scattering;
+            const auto [place, is_new] =
+                offsets.try_emplace(tile.get(), static_cast<std::uint16_t>(materials_.size()));
+            if (is_new) materials_.insert(materials_.end(), scattering.begin(), scattering.end());
+            parts_.push_back({static_cast<std::uint32_t>(cloths.size()), tile, place->second});
           }
-          Shell shell = make_shell(piece.mesh, exemplar);
+          Shell shell = make_shell(piece.mesh, piece.tiling);
           if (piece.underlay)
-            black_meshes.push_back(shell.underside_mesh(kUnderlayGap * thickness(exemplar)));
-          cloths.push_back({std::move(piece.tile), std::move(shell), place->second});
+            black_meshes.push_back(shell.underside_mesh(kUnderlayGap * thickness(piece.tiling)));
+          std::optional<YarnTints> tints;
+          if (piece.yarn_tint) tints.emplace(piece.tiling, *piece.yarn_tint);
+          cloths.push_back(
+              {std::move(piece.tiling), std::move(shell), first_part, std::move(tints)});
         }
         return cloths;
       }()),
@@ -98,10 +102,17 @@ bool ClothScene::occluded(const SceneRay& ray) const {
   bool is_blocked = false;
   double limit = ray.t_max;
   walk(ray, RayReach::kEverything, limit,
-       [&](std::uint32_t cloth, const ShellInterval& interval, std::uint32_t own_fiber) {
+       [&](std::uint32_t cloth, const ShellInterval& interval, const OwnFiber& own) {
+         const Cloth& here = cloths_[cloth];
          const LocalRay local =
-             local_ray(interval, exemplar(cloth), ray.from != nullptr && interval.t0 == 0.0);
-         if (!cloths_[cloth].tile->occluded(local.ray, own_fiber)) return false;
+             local_ray(interval, here.tiling, ray.from != nullptr && interval.t0 == 0.0);
+         const auto meets_fiber = [&](std::uint32_t exemplar,
+                                      const Ray& in_tile) -> std::optional<FiberHit> {
+           const std::uint32_t part = here.first_part + exemplar;
+           if (!parts_[part].tile->occluded(in_tile, own.within(part))) return {};
+           return FiberHit{0, 0};
+         };
+         if (!here.tiling.first_hit(local.place, local.ray, meets_fiber)) return false;
          is_blocked = true;
          limit = -1;
          return true;
@@ -118,17 +129,14 @@ bool ClothScene::visible(const Shell::SurfacePoint& point, const Vec3& direction
   return !occluded({point.position + kLiftMm * point.normal, direction});
 }
 
-ClothScene::LocalRay ClothScene::local_ray(const ShellInterval& interval, const Exemplar& exemplar,
+ClothScene::LocalRay ClothScene::local_ray(const ShellInterval& interval, const ClothTiling& tiling,
                                            bool at_start) {
   const double margin = std::min(1.0, kMarginMm / (interval.t1 - interval.t0));
   const double before = at_start ? 0.0 : margin;
   const Vec3d direction = interval.fabric1 - interval.fabric0;
-  Vec3d origin = interval.fabric0 - before * direction;
-  const double width = exemplar.width_mm;
-  const double height = exemplar.height_mm;
-  origin.x() -= width * std::floor(origin.x() / width);
-  origin.y() -= height * std::floor(origin.y() / height);
-  return {{origin.cast<float>(), direction.cast<float>(), 0.0F,
+  const BlockPlace place = tiling.place_of(interval.fabric0 - before * direction);
+  return {place,
+          {place.offset.cast<float>(), direction.cast<float>(), 0.0F,
            static_cast<float>(1.0 + before + margin)},
           before};
 }
@@ -145,8 +153,7 @@ std::uint32_t ClothScene::degenerate_tets() const {
   return count;
 }
 
-ClothScene make_cloth_scene(const SceneConfig& config,
-                            std::span<const std::shared_ptr<const TileScene>> tiles) {
+ClothScene make_cloth_scene(const SceneConfig& config, std::span<const ClothTiling> tilings) {
   std::vector<ClothPiece> pieces;
   std::vector<SurfaceCloth> surfaces;
   for (const ClothConfig& cloth : config.cloths) {
@@ -156,7 +163,8 @@ ClothScene make_cloth_scene(const SceneConfig& config,
     if (cloth.surface) {
       surfaces.emplace_back(cloth.surface->model, std::move(mesh));
     } else {
-      pieces.push_back({tiles[pieces.size()], std::move(mesh), cloth.underlay});
+      if (cloth.yarn_drift) mesh = with_yarn_drift(std::move(mesh), *cloth.yarn_drift);
+      pieces.push_back({tilings[pieces.size()], std::move(mesh), cloth.underlay, cloth.yarn_tint});
     }
   }
   std::vector<TriangleMesh> black;

@@ -7,8 +7,11 @@
 //
 // Shells may overlap in space, and a ray visits all of them. Only a ray that starts inside one
 // shell does not see what another shell holds around its very origin. Fabric coordinates are folded
-// into the base tile in double before they become floats. Tested in
-// tests/render/cloth_scene_test.cpp.
+// into a tile or block in double before they become floats.
+//
+// A cloth may be made of blocks of several exemplars (cloth_tiling.h). What one exemplar covers of
+// a cloth is a part of the scene. Parts are numbered through all cloths of fibers; where every
+// cloth has one exemplar, parts are cloths. Tested in tests/render/cloth_scene_test.cpp.
 
 #include <algorithm>
 #include <atomic>
@@ -20,29 +23,42 @@
 #include <vector>
 
 #include "fibers/math/vector.h"
+#include "fibers/tracing/cloth_tiling.h"
 #include "fibers/tracing/tile_scene.h"
 #include "render/scene_config.h"
 #include "render/shell.h"
 #include "render/surface_cloth.h"
 #include "render/triangle_scene.h"
+#include "render/yarn_tints.h"
 
 namespace heddle {
 
 /// One piece of cloth. Pieces of the same fabric share their tile.
 struct ClothPiece {
-  std::shared_ptr<const TileScene> tile;
+  ClothTiling tiling;
   ClothMesh mesh;
   bool underlay = false;  // a black copy of the underside lies below
+  std::optional<YarnTintConfig> yarn_tint = {};
 };
 
 /// A point on a fiber, seen through a shell.
 struct ShellHit {
   std::uint32_t cloth = 0;
+  std::uint32_t part = 0;
   std::uint32_t tet = 0;
   std::uint32_t segment = 0;
   double t = 0;    // mm along the ray
   Vec3d position;  // world
   Vec3d fabric;    // fabric space, not folded into the tile
+};
+
+/// A fiber that a ray ignores; none by default.
+struct OwnFiber {
+  std::uint32_t part = 0;
+  std::uint32_t fiber = kNoFiber;
+  std::uint32_t within(std::uint32_t some_part) const {
+    return some_part == part ? fiber : kNoFiber;
+  }
 };
 
 /// A point on a mesh.
@@ -78,18 +94,26 @@ class ClothScene {
   /// Pieces of fibers; all that `cloth` counts below.
   std::size_t cloth_count() const { return cloths_.size(); }
   const Shell& shell(std::uint32_t cloth) const { return cloths_[cloth].shell; }
-  const TileScene& tile(std::uint32_t cloth) const { return *cloths_[cloth].tile; }
-  const Exemplar& exemplar(std::uint32_t cloth) const { return cloths_[cloth].tile->exemplar(); }
+  const ClothTiling& tiling(std::uint32_t cloth) const { return cloths_[cloth].tiling; }
+  std::size_t part_count() const { return parts_.size(); }
+  std::uint32_t cloth_of_part(std::uint32_t part) const { return parts_[part].cloth; }
+  const TileScene& tile(std::uint32_t part) const { return *parts_[part].tile; }
+  const Exemplar& exemplar(std::uint32_t part) const { return parts_[part].tile->exemplar(); }
   /// Materials of all fabrics in one list, each fabric once: a fiber's index is
-  /// material_offset(cloth) + its own.
-  std::uint16_t material_offset(std::uint32_t cloth) const {
-    return cloths_[cloth].material_offset;
-  }
+  /// material_offset(part) + its own.
+  std::uint16_t material_offset(std::uint32_t part) const { return parts_[part].material_offset; }
   std::vector<FiberScattering> materials() const { return materials_; }
+  bool has_tints(std::uint32_t part) const { return cloths_[parts_[part].cloth].tints.has_value(); }
+  /// Factor of the scattering of the yarn at a hit; 1 where the cloth has no tints.
+  float tint(const ShellHit& hit) const {
+    const Cloth& cloth = cloths_[hit.cloth];
+    if (!cloth.tints) return 1;
+    return cloth.tints->tint_at(cloth.tiling, hit.part - cloth.first_part, hit.segment, hit.fabric);
+  }
 
-  /// The first hit of `query` along the ray. query(cloth, ray, own_fiber) ->
-  /// std::optional<FiberHit> looks along a fabric-space ray from its origin to t_max. own_fiber is
-  /// kNoFiber or the fiber to ignore.
+  /// The first hit of `query` along the ray. query(part, ray, own_fiber) ->
+  /// std::optional<FiberHit> looks along a ray in the tile of the part's exemplar, from its origin
+  /// to t_max. own_fiber is kNoFiber or the fiber to ignore.
   template <class Query>
   std::optional<ShellHit> first_hit(const SceneRay& ray, RayReach reach, Query&& query) const;
 
@@ -97,8 +121,8 @@ class ClothScene {
   std::optional<ShellHit> first_fiber(const SceneRay& ray,
                                       RayReach reach = RayReach::kEverything) const {
     return first_hit(ray, reach,
-                     [this](std::uint32_t cloth, const Ray& local, std::uint32_t own_fiber) {
-                       return cloths_[cloth].tile->intersect(local, own_fiber);
+                     [this](std::uint32_t part, const Ray& local, std::uint32_t own_fiber) {
+                       return parts_[part].tile->intersect(local, own_fiber);
                      });
   }
   /// Does the ray meet a fiber or a mesh?
@@ -139,7 +163,7 @@ class ClothScene {
   /// Unit tangent of the hit fiber in world space.
   Vec3 world_tangent(const ShellHit& hit) const {
     return (shell(hit.cloth).world_from_fabric(hit.tet) *
-            exemplar(hit.cloth).segment_tangent(hit.segment))
+            exemplar(hit.part).segment_tangent(hit.segment))
         .normalized();
   }
 
@@ -150,25 +174,33 @@ class ClothScene {
 
  private:
   struct Cloth {
-    std::shared_ptr<const TileScene> tile;
+    ClothTiling tiling;
     Shell shell;
+    std::uint32_t first_part;
+    std::optional<YarnTints> tints;
+  };
+  struct Part {
+    std::uint32_t cloth;
+    std::shared_ptr<const TileScene> tile;
     std::uint16_t material_offset;
   };
 
-  // The ray in fabric space over one interval: s = t - margin runs from 0 (t0) to 1 (t1). It is a
-  // little longer at the ends that are not the start of the ray, so that nothing falls between two
-  // tetrahedra.
+  // The ray in fabric space over one interval, from a place's corner: s = t - margin runs from 0
+  // (t0) to 1 (t1). It is a little longer at the ends that are not the start of the ray, so that
+  // nothing falls between two tetrahedra.
   struct LocalRay {
+    BlockPlace place;
     Ray ray;
     double margin;
   };
-  static LocalRay local_ray(const ShellInterval& interval, const Exemplar& exemplar, bool at_start);
+  static LocalRay local_ray(const ShellInterval& interval, const ClothTiling& tiling,
+                            bool at_start);
 
   // Shorter intervals are left to the margins of their neighbours.
   static constexpr double kShortestMm = 1e-7;
   static constexpr double kMarginMm = 1e-6;
 
-  // Calls visit(cloth, interval, own_fiber) -> bool for the shells in order of where the ray enters
+  // Calls visit(cloth, interval, own) -> bool for the shells in order of where the ray enters
   // them; true stops the walk through this shell. `limit` may shrink meanwhile, and nothing that
   // starts beyond it is visited.
   template <class Visit>
@@ -177,6 +209,7 @@ class ClothScene {
   static std::vector<TriangleMesh> boundaries(const std::vector<Cloth>& cloths);
 
   std::vector<FiberScattering> materials_;
+  std::vector<Part> parts_;
   std::vector<Cloth> cloths_;
   TriangleScene boundary_;  // mesh index = cloth
   std::vector<SurfaceCloth> surfaces_;
@@ -184,9 +217,8 @@ class ClothScene {
   mutable std::atomic<std::uint64_t> failed_walks_ = 0;
 };
 
-/// The scene of a config. tiles: [cloth that has a fabric].
-ClothScene make_cloth_scene(const SceneConfig& config,
-                            std::span<const std::shared_ptr<const TileScene>> tiles);
+/// The scene of a config. tilings: [cloth that has a fabric].
+ClothScene make_cloth_scene(const SceneConfig& config, std::span<const ClothTiling> tilings);
 
 template <class Visit>
 void ClothScene::walk(const SceneRay& ray, RayReach reach, const double& limit,
@@ -197,11 +229,11 @@ void ClothScene::walk(const SceneRay& ray, RayReach reach, const double& limit,
   };
   if (ray.from != nullptr) {
     const std::uint32_t cloth = ray.from->cloth;
-    const std::uint32_t own_fiber = exemplar(cloth).segment_fiber[ray.from->segment];
+    const OwnFiber own{ray.from->part, exemplar(ray.from->part).segment_fiber[ray.from->segment]};
     note(shell(cloth).walk_from_inside(
         ray.origin, direction, ray.from->tet, ray.from->fabric, [&](const ShellInterval& interval) {
           return interval.t0 > limit ||
-                 (interval.t1 - interval.t0 > kShortestMm && visit(cloth, interval, own_fiber));
+                 (interval.t1 - interval.t0 > kShortestMm && visit(cloth, interval, own));
         }));
     if (reach == RayReach::kOwnShell) return;
   }
@@ -214,7 +246,7 @@ void ClothScene::walk(const SceneRay& ray, RayReach reach, const double& limit,
              .walk_from_face(
                  ray.origin, direction, crossing.triangle, [&](const ShellInterval& interval) {
                    return interval.t0 > limit || (interval.t1 - interval.t0 > kShortestMm &&
-                                                  visit(crossing.mesh, interval, kNoFiber));
+                                                  visit(crossing.mesh, interval, OwnFiber{}));
                  }));
   }
 }
@@ -225,18 +257,24 @@ std::optional<ShellHit> ClothScene::first_hit(const SceneRay& ray, RayReach reac
   std::optional<ShellHit> best;
   double limit = ray.t_max;
   walk(ray, reach, limit,
-       [&](std::uint32_t cloth, const ShellInterval& interval, std::uint32_t own_fiber) {
+       [&](std::uint32_t cloth, const ShellInterval& interval, const OwnFiber& own) {
+         const Cloth& here = cloths_[cloth];
          const LocalRay local =
-             local_ray(interval, exemplar(cloth), ray.from != nullptr && interval.t0 == 0.0);
-         const std::optional<FiberHit> hit = query(cloth, local.ray, own_fiber);
-         if (!hit) return false;
-         const double s = std::clamp(static_cast<double>(hit->t) - local.margin, 0.0, 1.0);
+             local_ray(interval, here.tiling, ray.from != nullptr && interval.t0 == 0.0);
+         const std::optional<TilingHit> found = here.tiling.first_hit(
+             local.place, local.ray, [&](std::uint32_t exemplar, const Ray& in_tile) {
+               const std::uint32_t part = here.first_part + exemplar;
+               return query(part, in_tile, own.within(part));
+             });
+         if (!found) return false;
+         const double s = std::clamp(static_cast<double>(found->hit.t) - local.margin, 0.0, 1.0);
          const double t = interval.t0 + s * (interval.t1 - interval.t0);
          if (t > limit || t < 0) return false;
          limit = t;
          best = ShellHit{cloth,
+                         here.first_part + found->exemplar,
                          interval.tet,
-                         hit->segment,
+                         found->hit.segment,
                          t,
                          ray.origin + t * ray.direction.cast<double>().normalized(),
                          interval.fabric0 + s * (interval.fabric1 - interval.fabric0)};

@@ -21,6 +21,7 @@ class ClothTrace {
     ShellHit hit;
     Vec3 tangent;            // unit, world
     std::uint16_t material;  // index into ClothScene::materials()
+    float tint;              // of the yarn
     bool is_end = false;
   };
 
@@ -28,10 +29,11 @@ class ClothTrace {
   ClothTrace(const ClothScene& scene, bool local) : scene_(&scene), local_(local) {}
 
   Vertex vertex(const ShellHit& hit) const {
-    const Exemplar& exemplar = scene_->exemplar(hit.cloth);
+    const Exemplar& exemplar = scene_->exemplar(hit.part);
     return {hit, scene_->world_tangent(hit),
-            static_cast<std::uint16_t>(scene_->material_offset(hit.cloth) +
-                                       exemplar.segment_material(hit.segment))};
+            static_cast<std::uint16_t>(scene_->material_offset(hit.part) +
+                                       exemplar.segment_material(hit.segment)),
+            scene_->tint(hit)};
   }
 
   std::optional<Vertex> next(const Vertex& from, const Vec3& direction) const {

@@ -102,11 +102,8 @@ DualScattering::Parts DualScatteringShading::scattered(const SeenFiber& fiber,
                                                        const Vec3& direction) const {
   const Vec3 fabric = scene_->fabric_direction(fiber.hit, direction);
   if (!pack_->light_from_both_sides && !(fabric.z() > 0)) return {};
-  // The hit in the base tile.
-  const Exemplar& exemplar = pack_->exemplar;
-  Vec3d position = fiber.hit.fabric;
-  position.x() -= std::floor(position.x() / exemplar.width_mm) * exemplar.width_mm;
-  position.y() -= std::floor(position.y() / exemplar.height_mm) * exemplar.height_mm;
+  const ClothTiling& tiling = scene_->tiling(fiber.hit.cloth);
+  const Vec3d position = tiling.in_tile(tiling.place_of(fiber.hit.fabric));
   return dual_.directional(fiber.point, position.cast<float>(), {direction, fabric});
 }
 

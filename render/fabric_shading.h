@@ -40,7 +40,7 @@ class FabricShading {
  public:
   virtual ~FabricShading() = default;
   /// Adds the light of some samples to what eye rays see. fibers: places in g_buffer.fibers, all on
-  /// one cloth of the fabric, those of one cell and tetrahedron side by side. seen: [sample].
+  /// one part of the fabric, those of one cell and tetrahedron side by side. seen: [sample].
   virtual void shade(const GBuffer& g_buffer, const LightVisibility& visibility,
                      std::span<const std::uint32_t> fibers, std::span<EyeSample> seen) const = 0;
 };

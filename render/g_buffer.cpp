@@ -36,8 +36,8 @@ GBuffer GBufferPass::run(const Camera& camera, const PixelRect& block, int first
 std::optional<ShellHit> GBufferPass::first_fiber(const SceneRay& ray) const {
   if (bricks_.empty()) return scene_->first_fiber(ray);
   return scene_->first_hit(ray, RayReach::kEverything,
-                           [this](std::uint32_t cloth, const Ray& local, std::uint32_t) {
-                             return bricks_[cloth]->first_hit(local);
+                           [this](std::uint32_t part, const Ray& local, std::uint32_t) {
+                             return bricks_[part]->first_hit(local);
                            });
 }
 
@@ -49,7 +49,7 @@ void GBufferPass::look(const EyeRay& ray, std::uint32_t sample, GBuffer& g_buffe
   const Vec3 wo = -ray.direction;
   g_buffer.covered[sample] = hit || mesh ? 1 : 0;
   if (hit) {
-    const FabricPack& pack = *packs_[hit->cloth];
+    const FabricPack& pack = *packs_[hit->part];
     const ShadingPoint point{
         hit->segment,
         pack.transfer ? pack.transfer->cell_of_segment[hit->segment] : 0,

@@ -59,7 +59,7 @@ struct GBuffer {
 
 class GBufferPass {
  public:
-  /// packs: [cloth of fibers]. bricks: the same, or empty: eye rays then look for the fibers
+  /// packs: [part of the scene]. bricks: the same, or empty: eye rays then look for the fibers
   /// themselves. The scene and the packs outlive the object.
   GBufferPass(const ClothScene& scene, std::vector<const FabricPack*> packs,
               std::vector<std::shared_ptr<const IdBricks>> bricks, std::uint64_t seed);

@@ -19,11 +19,11 @@ Vec2 sample_gaussian2(RandomStream& random) {
 
 }  // namespace
 
-LightVisibilityPass::LightVisibilityPass(const ClothScene& scene, std::vector<Cloth> cloths,
+LightVisibilityPass::LightVisibilityPass(const ClothScene& scene, std::vector<Part> parts,
                                          std::span<const Light> lights, bool draw_directions,
                                          std::uint64_t seed)
     : scene_(&scene),
-      cloths_(std::move(cloths)),
+      parts_(std::move(parts)),
       lights_(lights),
       draw_directions_(draw_directions),
       seed_(seed) {}
@@ -49,21 +49,21 @@ LightVisibility LightVisibilityPass::run(const GBuffer& g_buffer) const {
 
 LightVisibility::OfLight LightVisibilityPass::find(const ShellHit& hit, const Light& light,
                                                    RandomStream& random) const {
-  const Cloth& cloth = cloths_[hit.cloth];
+  const Part& part = parts_[hit.part];
   Vec3 direction = light.axis;
   float height = 0;
   for (int draw = 0; draw < kFaceDraws; ++draw) {
     if (!light.is_directional()) direction = sample_light(light, random).direction;
     height = scene_->fabric_direction(hit, direction).z();
-    if (cloth.light_from_both_sides || height > 0 || light.is_directional()) break;
+    if (part.light_from_both_sides || height > 0 || light.is_directional()) break;
   }
-  if (!cloth.light_from_both_sides && !(height > 0)) return {};
+  if (!part.light_from_both_sides && !(height > 0)) return {};
   const ClothSide side = height > 0 ? ClothSide::kFace : ClothSide::kBack;
 
   LightVisibility::OfLight result;
   result.at_point = scene_->globally_visible(scene_->surface_point(hit, side), direction);
   const Eigen::Vector2d moved =
-      hit.fabric.head<2>() + cloth.shadow_sigma_mm * sample_gaussian2(random).cast<double>();
+      hit.fabric.head<2>() + part.shadow_sigma_mm * sample_gaussian2(random).cast<double>();
   const std::optional<Shell::SurfacePoint> nearby = scene_->surface_point(hit, moved, side);
   // Beyond a rim there is no cloth to take light from.
   result.nearby = nearby ? scene_->globally_visible(*nearby, direction) : result.at_point;

@@ -43,14 +43,14 @@ struct LightVisibility {
 
 class LightVisibilityPass {
  public:
-  /// What visibility depends on of one cloth of fibers.
-  struct Cloth {
+  /// What visibility depends on of one part of the scene.
+  struct Part {
     bool light_from_both_sides;
     double shadow_sigma_mm;  // deviation of the Gaussian along the cloth
   };
-  /// cloths: [cloth of fibers]. lights: directional and Gaussian ones. The scene and the lights
+  /// parts: [part of the scene]. lights: directional and Gaussian ones. The scene and the lights
   /// outlive the object. draw_directions: LightVisibility::direction is wanted.
-  LightVisibilityPass(const ClothScene& scene, std::vector<Cloth> cloths,
+  LightVisibilityPass(const ClothScene& scene, std::vector<Part> parts,
                       std::span<const Light> lights, bool draw_directions, std::uint64_t seed);
 
   LightVisibility run(const GBuffer& g_buffer) const;
@@ -60,7 +60,7 @@ class LightVisibilityPass {
                                 RandomStream& random) const;
 
   const ClothScene* scene_;
-  std::vector<Cloth> cloths_;
+  std::vector<Part> parts_;
   std::span<const Light> lights_;
   bool draw_directions_;
   std::uint64_t seed_;

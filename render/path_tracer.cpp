@@ -35,7 +35,8 @@ PathTracer::Sample PathTracer::radiance(const ClothTrace::Vertex& vertex, const 
       const LightSample incoming = sample_light(light, random);
       const Vec3 local_in = frame.transpose() * incoming.direction;
       const float cosine = std::sqrt(std::max(0.0F, 1.0F - local_in.x() * local_in.x()));
-      Rgb value = throughput * incoming.weight * bcsdf.evaluate(local_in, local_out) * cosine;
+      Rgb value =
+          throughput * incoming.weight * bcsdf.evaluate(local_in, local_out) * cosine * at.tint;
       if (!(value.maxCoeff() > 0)) continue;
       if (settings_.estimator == LightEstimator::kCombined && !light.is_directional()) {
         value *= power_heuristic(incoming.pdf, bcsdf.pdf(local_in, local_out, throughput));

@@ -5,12 +5,14 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cmath>
 #include <map>
 #include <numeric>
 #include <tuple>
 #include <utility>
 
 #include "formats/input_error.h"
+#include "render/yarn_tints.h"
 
 namespace heddle {
 namespace {
@@ -44,7 +46,7 @@ std::vector<const FabricPack*> checked(std::span<const FabricPack* const> packs,
   return {packs.begin(), packs.end()};
 }
 
-/// [cloth]; empty where eye rays do not march through volumes.
+/// [part]; empty where eye rays do not march through volumes.
 std::vector<std::shared_ptr<const IdBricks>> bricks_of(std::span<const FabricPack* const> packs,
                                                        const MethodRow& method) {
   std::map<const FabricPack*, std::shared_ptr<const IdBricks>> by_pack;
@@ -58,16 +60,27 @@ std::vector<std::shared_ptr<const IdBricks>> bricks_of(std::span<const FabricPac
   return bricks;
 }
 
-std::vector<LightVisibilityPass::Cloth> visibility_cloths(const ClothScene& scene,
-                                                          std::span<const FabricPack* const> packs,
-                                                          std::optional<double> shadow_sigma_mm) {
-  std::vector<LightVisibilityPass::Cloth> cloths;
-  for (std::uint32_t cloth = 0; cloth < packs.size(); ++cloth) {
-    const Shell& shell = scene.shell(cloth);
-    cloths.push_back({packs[cloth]->light_from_both_sides,
-                      shadow_sigma_mm.value_or(shell.z_max() - shell.z_min())});
+std::vector<LightVisibilityPass::Part> visibility_parts(const ClothScene& scene,
+                                                        std::span<const FabricPack* const> packs,
+                                                        std::optional<double> shadow_sigma_mm) {
+  std::vector<LightVisibilityPass::Part> parts;
+  for (std::uint32_t part = 0; part < packs.size(); ++part) {
+    const Shell& shell = scene.shell(scene.cloth_of_part(part));
+    parts.push_back({packs[part]->light_from_both_sides,
+                     shadow_sigma_mm.value_or(shell.z_max() - shell.z_min())});
   }
-  return cloths;
+  return parts;
+}
+
+/// [part]
+std::vector<std::optional<Rgb>> own_scatterings_of(const ClothScene& scene,
+                                                   std::span<const FabricPack* const> packs) {
+  std::vector<std::optional<Rgb>> scatterings(packs.size());
+  for (std::uint32_t part = 0; part < packs.size(); ++part) {
+    if (scene.has_tints(part))
+      scatterings[part] = own_yarn_scatterings(scene.tile(part), packs[part]->materials);
+  }
+  return scatterings;
 }
 
 std::vector<MultipleScattering::LightShape> shapes_of(std::span<const Light> lights,
@@ -83,14 +96,14 @@ std::vector<MultipleScattering::LightShape> shapes_of(std::span<const Light> lig
   return shapes;
 }
 
-/// Places in g_buffer.fibers, those of one cloth, cell and tetrahedron side by side.
+/// Places in g_buffer.fibers, those of one part, cell and tetrahedron side by side.
 std::vector<std::uint32_t> shading_order(const GBuffer& g_buffer) {
   const std::vector<SeenFiber>& fibers = g_buffer.fibers;
   std::vector<std::uint32_t> order(fibers.size());
   std::iota(order.begin(), order.end(), 0U);
   std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
-    return std::tie(fibers[a].hit.cloth, fibers[a].point.cell, fibers[a].hit.tet, a) <
-           std::tie(fibers[b].hit.cloth, fibers[b].point.cell, fibers[b].hit.tet, b);
+    return std::tie(fibers[a].hit.part, fibers[a].point.cell, fibers[a].hit.tet, a) <
+           std::tie(fibers[b].hit.part, fibers[b].point.cell, fibers[b].hit.tet, b);
   });
   return order;
 }
@@ -110,8 +123,9 @@ PrecomputedRenderer::PrecomputedRenderer(const ClothScene& scene,
       packs_(checked(packs, needs_of(settings.method, lights_, settings.blend))),
       shapes_(shapes_of(lights_, method_row(settings.method))),
       shadings_(make_shadings()),
+      own_scatterings_(own_scatterings_of(scene, packs_)),
       g_buffer_pass_(scene, packs_, bricks_of(packs, method_row(settings.method)), settings.seed),
-      visibility_pass_(scene, visibility_cloths(scene, packs, settings.shadow_sigma_mm), lights_,
+      visibility_pass_(scene, visibility_parts(scene, packs, settings.shadow_sigma_mm), lights_,
                        method_row(settings.method).draws_light, settings.seed) {}
 
 std::vector<std::shared_ptr<const FabricShading>> PrecomputedRenderer::make_shadings() const {
@@ -119,12 +133,12 @@ std::vector<std::shared_ptr<const FabricShading>> PrecomputedRenderer::make_shad
   assert(method.make_shading != nullptr && "expected a method that traces no paths");
   std::map<const FabricPack*, std::shared_ptr<const FabricShading>> by_pack;
   std::vector<std::shared_ptr<const FabricShading>> shadings;
-  for (std::uint32_t cloth = 0; cloth < packs_.size(); ++cloth) {
-    std::shared_ptr<const FabricShading>& own = by_pack[packs_[cloth]];
+  for (std::uint32_t part = 0; part < packs_.size(); ++part) {
+    std::shared_ptr<const FabricShading>& own = by_pack[packs_[part]];
     if (!own) {
       own = method.make_shading({.scene = scene_,
-                                 .tile = &scene_->tile(cloth),
-                                 .pack = packs_[cloth],
+                                 .tile = &scene_->tile(part),
+                                 .pack = packs_[part],
                                  .lights = lights_,
                                  .shapes = shapes_,
                                  .blend = settings_.blend,
@@ -148,15 +162,27 @@ std::vector<EyeSample> PrecomputedRenderer::shade(const GBuffer& g_buffer,
     seen[surface.sample].single = surface_light(surface, random);
   }
   const std::vector<std::uint32_t> order = shading_order(g_buffer);
-  const auto cloth_of = [&](std::uint32_t k) { return g_buffer.fibers[k].hit.cloth; };
+  const auto part_of = [&](std::uint32_t k) { return g_buffer.fibers[k].hit.part; };
   for (auto first = order.begin(); first != order.end();) {
-    const std::uint32_t cloth = cloth_of(*first);
+    const std::uint32_t part = part_of(*first);
     const auto last =
-        std::find_if(first, order.end(), [&](std::uint32_t k) { return cloth_of(k) != cloth; });
-    shadings_[cloth]->shade(g_buffer, visibility, {first, last}, seen);
+        std::find_if(first, order.end(), [&](std::uint32_t k) { return part_of(k) != part; });
+    shadings_[part]->shade(g_buffer, visibility, {first, last}, seen);
     first = last;
   }
+  tint_yarns(g_buffer, seen);
   return seen;
+}
+
+void PrecomputedRenderer::tint_yarns(const GBuffer& g_buffer, std::span<EyeSample> seen) const {
+  for (const SeenFiber& fiber : g_buffer.fibers) {
+    const std::optional<Rgb>& scatterings = own_scatterings_[fiber.hit.part];
+    if (!scatterings) continue;
+    const float tint = scene_->tint(fiber.hit);
+    EyeSample& sample = seen[fiber.sample];
+    sample.single *= tint;
+    for (int c = 0; c < 3; ++c) sample.multiple[c] *= std::pow(tint, (*scatterings)[c]);
+  }
 }
 
 Rgb PrecomputedRenderer::surface_light(const SeenSurface& surface, RandomStream& random) const {

@@ -5,7 +5,7 @@
 //   1. g_buffer.h: cloth, segment, cell, frames and fabric position of every sample. In: scene,
 //      fibers or id volumes, camera.
 //   2. light_visibility.h: shadow rays past all macroscopic things. In: G-buffer, scene, lights.
-//   3. fabric_shading.h, sorted by cloth, cell and tetrahedron. In: G-buffer, visibility, lights,
+//   3. fabric_shading.h, sorted by part, cell and tetrahedron. In: G-buffer, visibility, lights,
 //      the fabrics' data.
 // Whoever keeps a G-buffer relights it by passes 2 and 3; where the lights change their brightness
 // only, by pass 3.
@@ -54,8 +54,8 @@ struct PrecomputedSettings {
 
 class PrecomputedRenderer {
  public:
-  /// packs: [cloth of fibers]; the same pack may serve several. Everything passed must outlive the
-  /// renderer. Errors: FileError where a pack lacks what the lights and settings need.
+  /// packs: [part of the scene]; the same pack may serve several. Everything passed must outlive
+  /// the renderer. Errors: FileError where a pack lacks what the lights and settings need.
   PrecomputedRenderer(const ClothScene& scene, std::span<const FabricPack* const> packs,
                       std::span<const Light> lights, const Rgb& background,
                       const PrecomputedSettings& settings);
@@ -78,6 +78,7 @@ class PrecomputedRenderer {
 
  private:
   std::vector<std::shared_ptr<const FabricShading>> make_shadings() const;
+  void tint_yarns(const GBuffer& g_buffer, std::span<EyeSample> seen) const;
   Rgb surface_light(const SeenSurface& surface, RandomStream& random) const;
 
   const ClothScene* scene_;
@@ -86,9 +87,11 @@ class PrecomputedRenderer {
   std::span<const Light> lights_;  // what all else is lit by: environments as Gaussians
   Rgb background_;
   PrecomputedSettings settings_;
-  std::vector<const FabricPack*> packs_;                        // [cloth of fibers]
+  std::vector<const FabricPack*> packs_;                        // [part of the scene]
   std::vector<MultipleScattering::LightShape> shapes_;          // [light]
-  std::vector<std::shared_ptr<const FabricShading>> shadings_;  // [cloth of fibers]
+  std::vector<std::shared_ptr<const FabricShading>> shadings_;  // [part of the scene]
+  // [part of the scene] own_yarn_scatterings(), where yarns have tints
+  std::vector<std::optional<Rgb>> own_scatterings_;
   GBufferPass g_buffer_pass_;
   LightVisibilityPass visibility_pass_;
 };

@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 #include <memory>
 #include <string_view>
 
+#include "formats/image_file.h"
 #include "render/environment_map.h"
 #include "render/surface/surface_presets.h"
 
@@ -19,6 +21,8 @@ constexpr NumberRange kAnyLength{-1e6, 1e6};
 constexpr NumberRange kSize{0, 1e5, true};
 constexpr NumberRange kComponent{-1e6, 1e6};
 constexpr NumberRange kLight{0, 1e9};
+constexpr int kMaxPatternExtent = 4096;  // blocks
+constexpr std::size_t kMaxPatternFabrics = 256;
 
 Vec3d vector_of(const std::array<double, 3>& values) {
   return {values[0], values[1], values[2]};
@@ -181,6 +185,117 @@ SurfaceMethod read_surface_method(const TomlTable& table, const SurfaceFabric& f
   return SurfaceMethod::kInteractive;
 }
 
+/// Two whole numbers.
+std::array<int, 2> whole_numbers(const TomlTable& table, std::string_view key,
+                                 const NumberRange& range, std::array<double, 2> fallback) {
+  const std::array<double, 2> values = table.number2(key, range, fallback);
+  if (values[0] != std::floor(values[0]) || values[1] != std::floor(values[1]))
+    table.fail(key, "expected whole numbers");
+  return {static_cast<int>(values[0]), static_cast<int>(values[1])};
+}
+
+std::uint64_t read_seed(const TomlTable& table) {
+  return static_cast<std::uint64_t>(table.integer("seed", 0, INT64_MAX, 1));
+}
+
+BlocksConfig read_blocks(const TomlTable& table) {
+  BlocksConfig blocks;
+  blocks.size_repeats = whole_numbers(table, "size_repeats", {1, 64}, {1, 1});
+  if (table.choice("order", {"aligned", "scattered"}, "aligned") == "scattered")
+    blocks.order = BlockOrder::kScattered;
+  blocks.seed = read_seed(table);
+  return blocks;
+}
+
+std::string hex_of(const std::uint8_t* rgb) {
+  return fmt::format("#{:02x}{:02x}{:02x}", rgb[0], rgb[1], rgb[2]);
+}
+
+PatternConfig read_pattern(const TomlTable& table) {
+  PatternConfig pattern;
+  std::map<std::string, std::uint16_t> fabric_of;  // by colour
+  for (const TomlTable& fabric : table.tables("fabric")) {
+    std::string color = fabric.string("color");
+    std::transform(color.begin(), color.end(), color.begin(),
+                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    if (color.size() != 7 || color[0] != '#' ||
+        color.find_first_not_of("0123456789abcdef", 1) != std::string::npos) {
+      fabric.fail("color", "expected a colour of the picture as \"#rrggbb\"");
+    }
+    if (!fabric_of.emplace(color, static_cast<std::uint16_t>(pattern.fabrics.size())).second)
+      fabric.fail("color", "expected a colour that no other fabric of the pattern has");
+    pattern.fabrics.push_back(fabric.existing_file("file"));
+  }
+  if (pattern.fabrics.empty() || pattern.fabrics.size() > kMaxPatternFabrics) {
+    table.fail("fabric",
+               fmt::format("expected 1 to {} [[cloth.pattern.fabric]]", kMaxPatternFabrics));
+  }
+  pattern.picture = table.existing_file("picture");
+  pattern.corner_blocks =
+      whole_numbers(table, "corner_blocks", {-kMaxPatternExtent, kMaxPatternExtent}, {0, 0});
+  if (table.choice("borders", {"cut", "woven"}, "cut") == "woven")
+    pattern.borders = PatternBorders::kWoven;
+  pattern.sample_blocks = static_cast<int>(table.integer("sample_blocks", 4, 4096, 64));
+  const RgbPicture picture = read_png(pattern.picture, kMaxPatternExtent);
+  pattern.columns = picture.width;
+  pattern.rows = picture.height;
+  for (int row = 0; row < picture.height; ++row) {
+    for (int column = 0; column < picture.width; ++column) {
+      const std::size_t pixel = static_cast<std::size_t>(picture.height - 1 - row) *
+                                    static_cast<std::size_t>(picture.width) +
+                                static_cast<std::size_t>(column);
+      const std::string color = hex_of(&picture.rgb[3 * pixel]);
+      const auto found = fabric_of.find(color);
+      if (found == fabric_of.end()) {
+        table.fail("picture",
+                   fmt::format("expected a picture of the colours of the pattern's fabrics; column "
+                               "{}, row {} from the top, is {}",
+                               column, picture.height - 1 - row, color));
+      }
+      pattern.blocks.push_back(found->second);
+    }
+  }
+  return pattern;
+}
+
+YarnDriftConfig read_yarn_drift(const TomlTable& table) {
+  YarnDriftConfig drift;
+  drift.spacing_rms = 0.01 * table.number("spacing_rms_percent", {0, 15});
+  drift.across_mm = table.number("across_mm", {0.01, 1e4});
+  drift.along_mm = table.number("along_mm", {0.01, 1e5});
+  if (drift.along_mm < drift.across_mm)
+    table.fail("along_mm", "expected a length that is not below across_mm");
+  drift.seed = read_seed(table);
+  return drift;
+}
+
+YarnTintConfig read_yarn_tint(const TomlTable& table) {
+  YarnTintConfig tint;
+  tint.rms = 0.01 * table.number("rms_percent", {0, 30});
+  tint.correlation_yarns = table.number("correlation_yarns", {0, 64}, 0.0);
+  tint.seed = read_seed(table);
+  return tint;
+}
+
+/// Fibers, in place of a surface.
+void read_fibers(const TomlTable& table, ClothConfig& cloth) {
+  if (const std::optional<TomlTable> pattern = table.optional_table("pattern")) {
+    cloth.pattern = read_pattern(*pattern);
+    cloth.blocks.emplace();
+    cloth.fabric = cloth.pattern->fabrics.front();
+  } else {
+    cloth.fabric = table.existing_file("fabric");
+    if (table.has("far_surface")) cloth.far_surface = read_surface(table, "far_surface");
+  }
+  if (const std::optional<TomlTable> blocks = table.optional_table("blocks"))
+    cloth.blocks = read_blocks(*blocks);
+  if (const std::optional<TomlTable> drift = table.optional_table("yarn_drift"))
+    cloth.yarn_drift = read_yarn_drift(*drift);
+  if (const std::optional<TomlTable> tint = table.optional_table("yarn_tint"))
+    cloth.yarn_tint = read_yarn_tint(*tint);
+  cloth.underlay = table.boolean("underlay", false);
+}
+
 ClothConfig read_cloth(const TomlTable& table) {
   ClothConfig cloth;
   if (table.has("mesh") == table.has("flat_mm"))
@@ -193,20 +308,25 @@ ClothConfig read_cloth(const TomlTable& table) {
     cloth.flat_width_mm = size[0];
     cloth.flat_height_mm = size[1];
   }
-  if (table.has("fabric") == table.has("surface"))
-    table.fail("fabric", "expected either fabric or surface");
+  const int choices = (table.has("fabric") ? 1 : 0) + (table.has("surface") ? 1 : 0) +
+                      (table.has("pattern") ? 1 : 0);
+  if (choices != 1) table.fail("fabric", "expected one of fabric, surface and pattern");
   if (table.has("surface")) {
     cloth.surface = read_surface(table, "surface");
     cloth.surface_method = read_surface_method(table, *cloth.surface);
   } else {
-    cloth.fabric = table.existing_file("fabric");
-    cloth.underlay = table.boolean("underlay", false);
-    if (table.has("far_surface")) cloth.far_surface = read_surface(table, "far_surface");
+    read_fibers(table, cloth);
   }
   return cloth;
 }
 
 }  // namespace
+
+std::vector<std::filesystem::path> fabric_files(const ClothConfig& cloth) {
+  if (cloth.surface) return {};
+  if (cloth.pattern) return cloth.pattern->fabrics;
+  return {cloth.fabric};
+}
 
 SceneConfig read_scene_config(const TomlTable& document) {
   SceneConfig scene;

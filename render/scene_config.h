@@ -4,6 +4,7 @@
 // and ranges: configs/README.md. Lengths in millimetres, angles in radians after parsing. Errors:
 // ConfigError with its place. Tested in tests/render/scene_config_test.cpp.
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -12,12 +13,15 @@
 #include <vector>
 
 #include "fibers/math/vector.h"
+#include "fibers/tracing/block_layout.h"
 #include "formats/toml_table.h"
 #include "render/camera.h"
 #include "render/lights.h"
 #include "render/methods.h"
 #include "render/surface/microcylinder.h"
 #include "render/surface/surface_model.h"
+#include "render/yarn_drift.h"
+#include "render/yarn_tints.h"
 
 namespace heddle {
 
@@ -40,19 +44,53 @@ struct SurfaceFabric {
   std::optional<MicrocylinderFabric> interactive;  // where the model has an interactive form
 };
 
+/// How blocks of exemplars are laid on a cloth's plane.
+struct BlocksConfig {
+  std::array<int, 2> size_repeats = {1, 1};  // weave repeats in a block along x and y
+  BlockOrder order = BlockOrder::kAligned;
+  std::uint64_t seed = 1;  // of the order
+};
+
+/// What lies where two fabrics of a pattern meet.
+enum class PatternBorders : std::uint8_t {
+  kCut,    // the fibers of each, cut at the block's border, as in Khungurn 2017, section 6.4
+  kWoven,  // blocks of a sample that is woven with these neighbours (pipeline/border_sample.h)
+};
+
+/// A picture that says which fabric lies where: one pixel, one block. It is repeated without end.
+struct PatternConfig {
+  std::vector<std::filesystem::path> fabrics;  // as `fabric` of a cloth
+  std::filesystem::path picture;
+  int columns = 1;
+  int rows = 1;
+  std::vector<std::uint16_t> blocks;  // [row][column] which of `fabrics`, rows upwards
+  // the cloth's block on which the picture's lower left pixel lies
+  std::array<int, 2> corner_blocks = {0, 0};
+  PatternBorders borders = PatternBorders::kCut;
+  int sample_blocks = 64;  // most blocks of the sample
+};
+
 struct ClothConfig {
   std::optional<MeshFile> mesh;  // an OBJ with UVs, or else a flat swatch
   double uv_size_mm = 0;         // flat cloth (mm) per unit of UV; meshes only
   // flat swatch centred on the world's origin, z = 0; x = weft, y = warp
   double flat_width_mm = 0;
   double flat_height_mm = 0;
-  std::filesystem::path fabric;  // fabric TOML; empty where a surface model draws the cloth
+  // fabric TOML; empty where a surface model draws the cloth; the first of a pattern
+  std::filesystem::path fabric;
+  std::optional<PatternConfig> pattern;       // in place of one fabric
+  std::optional<BlocksConfig> blocks;         // with a pattern, or to break up one fabric's repeat
+  std::optional<YarnDriftConfig> yarn_drift;  // fibers only
+  std::optional<YarnTintConfig> yarn_tint;    // fibers only
   std::optional<SurfaceFabric> surface;
   SurfaceMethod surface_method = SurfaceMethod::kSampled;
   // fibers only: what a plan may draw instead where it is good enough
   std::optional<SurfaceFabric> far_surface;
   bool underlay = false;  // a black copy of the cloth's underside just below it; fibers only
 };
+
+/// The fabric files of a cloth: none for a surface, one, or those of its pattern.
+std::vector<std::filesystem::path> fabric_files(const ClothConfig& cloth);
 
 /// A path-traced crop of a view, to compare the view with.
 struct ReferenceConfig {

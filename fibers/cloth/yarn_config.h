@@ -62,13 +62,13 @@ struct YarnConfig {
 /// Reads a table [fiber.NAME].
 FiberType read_fiber(const TomlTable& table, const std::string& name);
 
-/// Reads the keys of one yarn from a table [yarn.NAME], [warp] or [weft]. Its structure may stand
-/// in a file of its own, named by `from`. A yarn with colours of its own adds a fiber type.
+/// Reads the keys of one yarn from a table [yarn.NAME], [warp] or [weft]. They may stand in a file
+/// of their own, named by `from`. A yarn with colours of its own adds a fiber type.
 YarnConfig read_yarn(const TomlTable& table, const std::string& name,
                      std::vector<FiberType>& fibers);
 
-/// The fiber type `fiber`, dyed so that thick cloth of it shows about the colour (linear rgb) in
-/// even light; found among `fibers` or added to them. Deep layers of scatterers of albedo a reflect
+/// The fiber type `fiber`, dyed so that thick cloth of it shows about the colour (linear rgb) in even
+/// light; found among `fibers` or added to them. Deep layers of scatterers of albedo a reflect
 /// R = (1 - g) / (1 + g), g = sqrt(1 - a) (diffusive reflectance, Hapke 1981), so color_tt becomes
 /// 4 R / (1 + R)^2. The surface's own reflection, color_r, stays.
 int dyed_fiber(int fiber, const Rgbd& color, std::vector<FiberType>& fibers);

@@ -25,6 +25,9 @@ enum class RandomStage : std::uint32_t {
   kTest = 10,
   kOpenness = 11,
   kWovenIrregularity = 12,
+  kBlockOrder = 13,
+  kYarnDrift = 14,
+  kYarnTint = 15,
 };
 
 /// SplitMix64 finaliser: a bijection of 64-bit words whose output bits all depend on all input

@@ -6,7 +6,8 @@
 // given the outgoing one. A scattered ray starts at the hit point and ignores its own fiber.
 //
 // A Trace offers
-//   // tangent: unit, in the space of the directions
+//   // tangent: unit, in the space of the directions; a Vertex may have a `float tint`, a factor of
+//   // what is scattered there
 //   struct Vertex { Vec3 position; Vec3 tangent; std::uint16_t material; ... };
 //   // first hit, own fiber ignored
 //   std::optional<Vertex> next(const Vertex& from, const Vec3& direction) const;
@@ -56,6 +57,7 @@ std::optional<PathEscape> walk_path(const Trace& trace, std::span<const BcsdfTab
     const BcsdfTable& bcsdf = materials[vertex.material];
     const auto sample = bcsdf.sample(frame.transpose() * wo, random, throughput);
     throughput *= sample.weight;
+    if constexpr (requires { vertex.tint; }) throughput *= vertex.tint;
     variance += sample.deviation * sample.deviation;
     if (n >= limits.roulette_from) {
       const float survival = std::min(1.0F, throughput.maxCoeff());

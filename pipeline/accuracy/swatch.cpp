@@ -109,7 +109,8 @@ Swatch::Swatch(const Exemplar& exemplar, std::uint64_t seed, const AccuracyEffor
 
 void Swatch::use_fibers(const std::shared_ptr<const TileScene>& tile) {
   config_.cloths[0].surface.reset();
-  flat_.reset(new ClothScene(make_cloth_scene(config_, std::span(&tile, 1))));
+  const ClothTiling tiling(tile);
+  flat_.reset(new ClothScene(make_cloth_scene(config_, std::span(&tiling, 1))));
   bent_ = std::make_unique<ClothScene>(std::vector<ClothPiece>{{tile, folded_cloth(), true}},
                                        std::vector<TriangleMesh>{});
 }

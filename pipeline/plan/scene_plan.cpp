@@ -1,8 +1,11 @@
 #include "pipeline/plan/scene_plan.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
+#include "formats/input_error.h"
 #include "pipeline/plan/policy.h"
 
 namespace heddle {
@@ -22,9 +25,21 @@ double path_samples(const Candidate& path, const Target& target, double pixels) 
   return traced ? static_cast<double>(traced->spp) * pixels * target.pictures : INFINITY;
 }
 
+/// Tables of accuracy know cloth of one fabric.
+void refuse_patterns(const std::filesystem::path& scene_file, const SceneConfig& scene) {
+  for (std::size_t k = 0; k < scene.cloths.size(); ++k) {
+    if (!scene.cloths[k].pattern) continue;
+    throw ConfigError(fmt::format(
+        "{}: a plan knows cloth of one fabric, and cloth {} has a pattern of {}. Choose the "
+        "method and the samples instead: --method, --spp",
+        scene_file.string(), k + 1, scene.cloths[k].pattern->fabrics.size()));
+  }
+}
+
 }  // namespace
 
 ScenePlan make_plan(const PlanQuestion& question, StageContext& context) {
+  refuse_patterns(question.scene, read_scene_config(TomlTable::load(question.scene)));
   ScenePlan plan;
   plan.question = question;
   const Target& target = question.target;

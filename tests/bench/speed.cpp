@@ -344,13 +344,13 @@ void renderer_rates(const std::string& scene_file, StageContext& context) {
   request.camera.height = 120;
   request.crop = {0, 0, 160, 120};
   const SceneConfig& config = job.config();
-  std::vector<std::shared_ptr<const TileScene>> tiles;
+  std::vector<ClothTiling> tilings;
   for (const ClothConfig& cloth : config.cloths) {
     if (!cloth.surface)
-      tiles.push_back(
+      tilings.push_back(
           std::make_shared<TileScene>(synthesize(read_fabric_document(cloth.fabric, {}).config)));
   }
-  const ClothScene scene = make_cloth_scene(config, tiles);
+  const ClothScene scene = make_cloth_scene(config, tilings);
   const Camera camera(request.camera);
   int hits = 0;
   constexpr int kRays = 160 * 120 * 8;

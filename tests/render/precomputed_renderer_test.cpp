@@ -478,5 +478,82 @@ TEST(PrecomputedRenderer, SaysWhatThePackLacks) {
   fails(pack, sharp, false);
 }
 
+/// Blocks of one and the other pack, like a chessboard, 0.6 mm each.
+std::unique_ptr<ClothScene> chessboard(const FabricPack& a, const FabricPack& b,
+                                       const std::optional<YarnTintConfig>& tint = {}) {
+  BlockLayout layout;
+  layout.width_mm = static_cast<double>(a.exemplar.width_mm);
+  layout.height_mm = static_cast<double>(a.exemplar.height_mm);
+  layout.tile_blocks = {{1, 1}, {1, 1}};
+  layout.columns = layout.rows = 2;
+  layout.pattern.clear();
+  for (const std::uint32_t exemplar : {0U, 1U, 1U, 0U})
+    layout.pattern.push_back({exemplar, BlockLayout::kByOrder, BlockLayout::kByOrder});
+  std::vector<ClothTiling::Tile> tiles = {std::make_shared<const TileScene>(a.exemplar),
+                                          std::make_shared<const TileScene>(b.exemplar)};
+  std::vector<ClothPiece> pieces;
+  pieces.push_back({ClothTiling(std::move(tiles), layout), flat_cloth(6, 4), false, tint});
+  return std::make_unique<ClothScene>(std::move(pieces), std::vector<TriangleMesh>{});
+}
+
+TEST(PrecomputedRenderer, EveryBlockIsShadedFromItsOwnPack) {
+  // A white fabric among black ones: its blocks show what it shows alone, the rest is black.
+  FabricPack white = open_pack(test::white_fiber(), true);
+  FabricPack black = white;
+  for (float& value : black.transfer->matrices) value = 0;
+  const auto scene = chessboard(white, black);
+  EXPECT_EQ(scene->part_count(), 2U);
+  const std::vector<const FabricPack*> packs = {&white, &black};
+  const std::vector<Light> lights = {gaussian({0, 0, 1}, 0, 4 * kPif)};
+  const PrecomputedRenderer renderer(*scene, packs, lights, Rgb(0, 0, 0), {});
+  const Camera camera = camera_above(2, 48, 32);
+  const FrameBuffers frame =
+      shade_picture(renderer, camera, camera.full_frame(), 1, test::no_progress);
+  int of_white = 0;
+  int of_black = 0;
+  for (std::size_t k = 0; k < frame.pixel_count(); ++k) {
+    if (frame.alpha[k] < 1) continue;
+    const BlockPlace place = scene->tiling(0).place_of(frame.fabric_position[k].cast<double>());
+    const bool is_white = (place.column + place.row) % 2 == 0;
+    (is_white ? of_white : of_black) += 1;
+    EXPECT_NEAR(frame.beauty[k].maxCoeff(), is_white ? 1 : 0, 1e-4) << k;
+  }
+  EXPECT_GT(of_white, 50);
+  EXPECT_GT(of_black, 50);
+}
+
+TEST(PrecomputedRenderer, TintsMultiplyWhatIsSeen) {
+  // The identity as transfer holds no yarn's light back: what is seen is a power of the tint.
+  FabricPack pack = open_pack(test_cotton(), true);
+  const std::vector<const FabricPack*> packs = {&pack, &pack};
+  const std::vector<Light> lights = {gaussian({0, 0, 1}, 0, 4 * kPif)};
+  const auto plain_scene = chessboard(pack, pack);
+  const auto scene = chessboard(pack, pack, YarnTintConfig{.rms = 0.2});
+  const Camera camera = camera_above(2, 48, 32);
+  const FrameBuffers plain =
+      shade_picture(PrecomputedRenderer(*plain_scene, packs, lights, Rgb(0, 0, 0), {}), camera,
+                    camera.full_frame(), 1, test::no_progress);
+  const FrameBuffers tinted =
+      shade_picture(PrecomputedRenderer(*scene, packs, lights, Rgb(0, 0, 0), {}), camera,
+                    camera.full_frame(), 1, test::no_progress);
+  const Rgb exponent = own_yarn_scatterings(scene->tile(0), pack.materials);
+  int changed = 0;
+  for (std::size_t k = 0; k < plain.pixel_count(); ++k) {
+    EXPECT_EQ(plain.alpha[k], tinted.alpha[k]);
+    if (plain.alpha[k] < 1) continue;
+    ShellHit hit;
+    hit.segment = plain.segment[k];
+    hit.fabric = plain.fabric_position[k].cast<double>();
+    const BlockPlace place = scene->tiling(0).place_of(hit.fabric);
+    hit.part = (place.column + place.row) % 2 == 0 ? 0 : 1;
+    const float tint = scene->tint(hit);
+    for (int c = 0; c < 3; ++c) {
+      EXPECT_NEAR(tinted.multiple[k][c], plain.multiple[k][c] * std::pow(tint, exponent[c]), 1e-5);
+    }
+    changed += std::abs(tint - 1) > 0.02F ? 1 : 0;
+  }
+  EXPECT_GT(changed, 50);
+}
+
 }  // namespace
 }  // namespace heddle

@@ -4,6 +4,7 @@
 
 #include <fstream>
 
+#include "formats/image_file.h"
 #include "formats/input_error.h"
 #include "render/surface/surface_presets.h"
 #include "tests/support/temporary_folder.h"
@@ -239,6 +240,80 @@ TEST_F(SceneConfigTest, ASceneNeedsLightAndCloth) {
                                                kScene.find("[[light]]") - kScene.find("[camera]")))
           .find("[[light]]"),
       std::string::npos);
+}
+
+/// kScene with another cloth than its own.
+std::string scene_with_cloth(const std::string& cloth) {
+  return kScene.substr(0, kScene.find("[[cloth]]")) + "[[cloth]]\nflat_mm = [10, 20]\n" + cloth;
+}
+
+const std::string kPattern =
+    "[cloth.pattern]\npicture = \"two.png\"\ncorner_blocks = [1, -2]\n"
+    "[[cloth.pattern.fabric]]\ncolor = \"#000000\"\nfile = \"silk.toml\"\n"
+    "[[cloth.pattern.fabric]]\ncolor = \"#FF8000\"\nfile = \"wool.toml\"\n";
+
+TEST_F(SceneConfigTest, APatternIsReadFromItsPicture) {
+  std::ofstream(folder_ / "wool.toml") << "name = \"wool\"\n";
+  // Upper row: black, orange, orange; lower row: orange, black, black.
+  write_png(folder_ / "two.png", 3, 2,
+            {0, 0, 0, 255, 128, 0, 255, 128, 0, 255, 128, 0, 0, 0, 0, 0, 0, 0});
+  const ClothConfig cloth = read(scene_with_cloth(kPattern)).cloths.at(0);
+  ASSERT_TRUE(cloth.pattern);
+  EXPECT_EQ(cloth.pattern->columns, 3);
+  EXPECT_EQ(cloth.pattern->rows, 2);
+  EXPECT_EQ(cloth.pattern->blocks, (std::vector<std::uint16_t>{1, 0, 0, 0, 1, 1}));
+  EXPECT_EQ(cloth.pattern->corner_blocks, (std::array<int, 2>{1, -2}));
+  EXPECT_EQ(fabric_files(cloth),
+            (std::vector<std::filesystem::path>{folder_ / "silk.toml", folder_ / "wool.toml"}));
+  ASSERT_TRUE(cloth.blocks);
+  EXPECT_EQ(cloth.blocks->order, BlockOrder::kAligned);
+
+  write_png(folder_ / "two.png", 1, 2, {0, 0, 0, 255, 128, 1});
+  EXPECT_NE(message(scene_with_cloth(kPattern)).find("column 0, row 1 from the top, is #ff8001"),
+            std::string::npos)
+      << message(scene_with_cloth(kPattern));
+}
+
+TEST_F(SceneConfigTest, APatternTakesTheFabricsPlace) {
+  std::ofstream(folder_ / "wool.toml") << "name = \"wool\"\n";
+  write_png(folder_ / "two.png", 1, 1, {0, 0, 0});
+  EXPECT_NE(message(scene_with_cloth("fabric = \"silk.toml\"\n" + kPattern))
+                .find("one of fabric, surface and pattern"),
+            std::string::npos);
+  EXPECT_NE(message(scene_with_cloth("")).find("one of fabric, surface and pattern"),
+            std::string::npos);
+  std::string same = kPattern;
+  same.replace(same.find("#FF8000"), 7, "#000000");
+  EXPECT_NE(message(scene_with_cloth(same)).find("that no other fabric of the pattern has"),
+            std::string::npos);
+  same.replace(same.rfind("#000000"), 7, "orange!");
+  EXPECT_NE(message(scene_with_cloth(same)).find("#rrggbb"), std::string::npos);
+}
+
+TEST_F(SceneConfigTest, UnevennessIsOffUnlessAsked) {
+  const ClothConfig plain = read(kScene).cloths.at(0);
+  EXPECT_FALSE(plain.blocks || plain.pattern || plain.yarn_drift || plain.yarn_tint);
+  const ClothConfig cloth =
+      read(scene_with_cloth(
+               "fabric = \"silk.toml\"\n"
+               "blocks = { size_repeats = [2, 3], order = \"scattered\", seed = 5 }\n"
+               "yarn_drift = { spacing_rms_percent = 4, across_mm = 1, along_mm = 9, seed = 6 }\n"
+               "yarn_tint = { rms_percent = 5, correlation_yarns = 2, seed = 7 }\n"))
+          .cloths.at(0);
+  EXPECT_EQ(cloth.blocks->size_repeats, (std::array<int, 2>{2, 3}));
+  EXPECT_EQ(cloth.blocks->order, BlockOrder::kScattered);
+  EXPECT_EQ(cloth.blocks->seed, 5U);
+  EXPECT_DOUBLE_EQ(cloth.yarn_drift->spacing_rms, 0.04);
+  EXPECT_EQ(cloth.yarn_drift->across_mm, 1);
+  EXPECT_EQ(cloth.yarn_drift->along_mm, 9);
+  EXPECT_EQ(cloth.yarn_drift->seed, 6U);
+  EXPECT_DOUBLE_EQ(cloth.yarn_tint->rms, 0.05);
+  EXPECT_EQ(cloth.yarn_tint->correlation_yarns, 2);
+  EXPECT_EQ(cloth.yarn_tint->seed, 7U);
+  EXPECT_NE(message(scene_with_cloth("fabric = \"silk.toml\"\nyarn_drift = { "
+                                     "spacing_rms_percent = 4, across_mm = 9, along_mm = 1 }\n"))
+                .find("not below across_mm"),
+            std::string::npos);
 }
 
 }  // namespace

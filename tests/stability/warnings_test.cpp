@@ -296,8 +296,8 @@ TEST(PictureWarningsStability, NoneOnTheQuickstart) {
       pack_of(tile->exemplar(),
               make_segment_cells(tile->exemplar(), origins, static_cast<float>(edge)).count);
   EXPECT_EQ(subjects_of(pack_warnings(pack, *tile)), Subjects{});
-  const std::vector<std::shared_ptr<const TileScene>> tiles = {tile};
-  const ClothScene scene = make_cloth_scene(config, tiles);
+  const std::vector<ClothTiling> tilings = {tile};
+  const ClothScene scene = make_cloth_scene(config, tilings);
   const std::vector<const FabricPack*> packs = {&pack};
   for (const ViewConfig& view : config.views) {
     const Camera camera(view.camera);
