@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "formats/atomic_file.h"
+#include "formats/content_hash.h"
 #include "formats/input_error.h"
 #include "formats/srgb_color.h"
 
@@ -301,8 +302,11 @@ bool contains(const NumberRange& range, double value) {
       fmt::format("{}: {} bytes; a config has at most {}", name, size, kMaxDocumentBytes));
 }
 
+/// What stands in the canonical text in place of a value.
+using Replacements = std::map<const toml::node*, std::string>;
+
 /// Minimal JSON-like text of a value; toml++ keeps the keys of a table sorted.
-void append_canonical(std::string& out, const toml::node& node);
+void append_canonical(std::string& out, const toml::node& node, const Replacements& replacements);
 
 void append_quoted(std::string& out, std::string_view text) {
   out += '"';
@@ -319,8 +323,12 @@ void append_quoted(std::string& out, std::string_view text) {
   out += '"';
 }
 
-void append_canonical(std::string& out, const toml::node& node) {
+void append_canonical(std::string& out, const toml::node& node, const Replacements& replacements) {
   const char* separator = "";
+  if (const auto replacement = replacements.find(&node); replacement != replacements.end()) {
+    append_quoted(out, replacement->second);
+    return;
+  }
   if (const auto* table = node.as_table()) {
     out += '{';
     for (const auto& [key, value] : *table) {
@@ -328,7 +336,7 @@ void append_canonical(std::string& out, const toml::node& node) {
       separator = ",";
       append_quoted(out, key.str());
       out += ':';
-      append_canonical(out, value);
+      append_canonical(out, value, replacements);
     }
     out += '}';
   } else if (const auto* array = node.as_array()) {
@@ -336,7 +344,7 @@ void append_canonical(std::string& out, const toml::node& node) {
     for (const toml::node& value : *array) {
       out += separator;
       separator = ",";
-      append_canonical(out, value);
+      append_canonical(out, value, replacements);
     }
     out += ']';
   } else if (const auto* text = node.as_string()) {
@@ -403,6 +411,7 @@ struct TomlTable::Document {
   std::vector<std::string> lines;
   toml::table values;
   Node root;
+  Replacements contents;  // of files asked for by content_file()
 
   [[noreturn]] void fail_at(const toml::source_position& place, const std::string& message) const {
     fail_at(name, lines, place, message);
@@ -619,6 +628,21 @@ std::int64_t TomlTable::integer(std::string_view key, std::int64_t min, std::int
   return integer->get();
 }
 
+std::optional<std::int64_t> TomlTable::optional_integer(std::string_view key, std::int64_t min,
+                                                        std::int64_t max) const {
+  const bool present = has(key);
+  const std::int64_t value = present ? integer(key, min, max) : 0;
+  node_->record(key, "integer", range_text(min, max), "optional");
+  return present ? std::optional(value) : std::nullopt;
+}
+
+std::optional<bool> TomlTable::optional_boolean(std::string_view key) const {
+  const bool present = has(key);
+  const bool value = present && boolean(key);
+  node_->record(key, "boolean", "", "optional");
+  return present ? std::optional(value) : std::nullopt;
+}
+
 bool TomlTable::boolean(std::string_view key, std::optional<bool> fallback) const {
   node_->record(key, "boolean", "", fallback ? fmt::format("{}", *fallback) : "required");
   const toml::node* value = node_->find(key);
@@ -706,6 +730,14 @@ std::vector<std::string> TomlTable::strings(std::string_view key, std::size_t mi
   return result;
 }
 
+std::vector<std::string> TomlTable::optional_strings(std::string_view key, std::size_t min_count,
+                                                     std::size_t max_count) const {
+  std::vector<std::string> result;
+  if (has(key)) result = strings(key, min_count, max_count);
+  node_->record(key, "string[]", "", "optional");
+  return result;
+}
+
 std::array<double, 3> TomlTable::color(std::string_view key) const {
   const std::string expected = "a colour: 3 numbers in [0, 1], or \"#rrggbb\"";
   node_->record(key, "color", "", "required");
@@ -722,6 +754,12 @@ std::array<double, 3> TomlTable::color(std::string_view key) const {
   for (std::size_t i = 0; i < 3; ++i)
     result[i] = document_->checked_number(key, (*array)[i], {.min = 0, .max = 1});
   return result;
+}
+
+std::filesystem::path TomlTable::content_file(std::string_view key) const {
+  std::filesystem::path path = existing_file(key);
+  document_->contents[node_->find(key)] = "content " + content_hash_of_file(path);
+  return path;
 }
 
 std::filesystem::path TomlTable::existing_file(std::string_view key) const {
@@ -838,7 +876,7 @@ const std::string& TomlTable::document_name() const {
 
 std::string TomlTable::canonical_text() const {
   std::string text;
-  append_canonical(text, *node_->values);
+  append_canonical(text, *node_->values, document_->contents);
   return text;
 }
 

@@ -54,7 +54,10 @@ class TomlTable {
   std::optional<double> optional_number(std::string_view key, NumberRange range) const;
   std::int64_t integer(std::string_view key, std::int64_t min, std::int64_t max,
                        std::optional<std::int64_t> fallback = {}) const;
+  std::optional<std::int64_t> optional_integer(std::string_view key, std::int64_t min,
+                                               std::int64_t max) const;
   bool boolean(std::string_view key, std::optional<bool> fallback = {}) const;
+  std::optional<bool> optional_boolean(std::string_view key) const;
   std::string string(std::string_view key, std::optional<std::string> fallback = {}) const;
   /// A string out of a fixed set; the error lists the set.
   std::string choice(std::string_view key, const std::vector<std::string_view>& choices,
@@ -69,10 +72,16 @@ class TomlTable {
   /// A required array of `min_count` to `max_count` strings.
   std::vector<std::string> strings(std::string_view key, std::size_t min_count,
                                    std::size_t max_count) const;
+  /// The same; empty where the key is absent.
+  std::vector<std::string> optional_strings(std::string_view key, std::size_t min_count,
+                                            std::size_t max_count) const;
   /// Linear rgb: an array of 3 numbers in [0, 1], or a string "#rrggbb", which is sRGB.
   std::array<double, 3> color(std::string_view key) const;
   /// A string taken as a path relative to the folder of the document. The file must exist.
   std::filesystem::path existing_file(std::string_view key) const;
+  /// The same for a file whose content belongs to the config: canonical_text() then holds a hash of
+  /// the content in place of the path.
+  std::filesystem::path content_file(std::string_view key) const;
 
   /// A required sub-table / an optional one / an array of tables ([[key]]; empty if absent).
   TomlTable table(std::string_view key) const;
@@ -96,7 +105,8 @@ class TomlTable {
   const std::string& document_name() const;
 
   /// Canonical text of the whole table (sorted keys, shortest round-trip numbers, no comments):
-  /// equal content, equal text. Used for cache keys.
+  /// equal content, equal text. Used for cache keys. Files asked for by content_file() before stand
+  /// in it by their content.
   std::string canonical_text() const;
 
  private:

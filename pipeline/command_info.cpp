@@ -9,6 +9,7 @@
 
 #include "fibers/baked/fabric_pack.h"
 #include "formats/atomic_file.h"
+#include "formats/curve_file.h"
 #include "formats/file_ending.h"
 #include "formats/hdr_file.h"
 #include "formats/id_volume_file.h"
@@ -19,6 +20,7 @@
 #include "pipeline/accuracy/accuracy_table.h"
 #include "pipeline/commands.h"
 #include "pipeline/fabric_report.h"
+#include "pipeline/draft_report.h"
 #include "pipeline/json_file.h"
 #include "pipeline/stages.h"
 #include "render/scene_config.h"
@@ -238,23 +240,57 @@ Report describe_json(const fs::path& path) {
       "record of an artifact, or a pack's manifest");
 }
 
-Report describe_mesh(const fs::path& path) {
-  const ObjMesh mesh = read_obj(path);
+void add_box(const std::vector<std::array<float, 3>>& points, Report& report) {
   std::array<float, 3> low{};
   std::array<float, 3> high{};
-  for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
+  for (std::size_t p = 0; p < points.size(); ++p) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const float x = mesh.positions[v][axis];
-      low[axis] = v == 0 ? x : std::min(low[axis], x);
-      high[axis] = v == 0 ? x : std::max(high[axis], x);
+      const float x = points[p][axis];
+      low[axis] = p == 0 ? x : std::min(low[axis], x);
+      high[axis] = p == 0 ? x : std::max(high[axis], x);
+    }
+  }
+  report["box_min"] = {rounded(low[0]), rounded(low[1]), rounded(low[2])};
+  report["box_max"] = {rounded(high[0]), rounded(high[1]), rounded(high[2])};
+}
+
+Report describe_curves(const fs::path& path) {
+  const CurveSet curves = read_curves(path);
+  const char* kinds[] = {"polylines", "uniform Catmull-Rom splines", "cubic B-splines",
+                         "cubic Bezier curves"};
+  Report report = {{"kind", "curves"}, {"of_kind", kinds[static_cast<int>(curves.kind)]}};
+  report["curves"] = curves.curve_count();
+  report["closed"] = std::count(curves.closed.begin(), curves.closed.end(), true);
+  report["points"] = curves.points.size();
+  if (curves.up != UpAxis::kUnknown)
+    report["up"] = std::string(1, "xyz"[static_cast<int>(curves.up)]);
+  if (!curves.thickness.empty()) {
+    const auto [thin, thick] =
+        std::minmax_element(curves.thickness.begin(), curves.thickness.end());
+    report["thickness"] = {rounded(*thin), rounded(*thick)};
+  }
+  if (!curves.info.empty()) report["info"] = curves.info;
+  add_box(curves.points, report);
+  return report;
+}
+
+/// The mesh of a Wavefront file, or the lines of one that has no mesh.
+Report describe_obj(const fs::path& path) {
+  ObjMesh mesh;
+  try {
+    mesh = read_obj(path);
+  } catch (const FileError& no_mesh) {
+    try {
+      return describe_curves(path);
+    } catch (const FileError&) {
+      throw no_mesh;
     }
   }
   Report report = {
       {"kind", "mesh"}, {"vertices", mesh.positions.size()}, {"triangles", mesh.triangles.size()}};
   report["has_uv"] = !mesh.uvs.empty();
   report["has_normals"] = !mesh.normals.empty();
-  report["box_min"] = {rounded(low[0]), rounded(low[1]), rounded(low[2])};
-  report["box_max"] = {rounded(high[0]), rounded(high[1]), rounded(high[2])};
+  add_box(mesh.positions, report);
   return report;
 }
 
@@ -275,12 +311,14 @@ Report describe(const fs::path& path, const CommonOptions& common) {
   if (ending == ".exr") return describe_image(read_exr(path));
   if (ending == ".hdr" || ending == ".pic") return describe_image(read_hdr(path));
   if (ending == ".png") return describe_png(path);
-  if (ending == ".obj") return describe_mesh(path);
+  if (ending == ".obj") return describe_obj(path);
+  if (ending == ".bcc" || ending == ".hair") return describe_curves(path);
+  if (ending == ".wif") return describe_draft(path);
   if (ending == ".json") return describe_json(path);
   throw FileError(
       path.string() +
-      ": expected a pack, or a file that ends in .toml, .safetensors, .vdb, .exr, .hdr, "
-      ".pic, .png, .obj or .json");
+      ": expected a pack, or a file that ends in .toml, .wif, .bcc, .hair, .safetensors, .vdb, "
+      ".exr, .hdr, .pic, .png, .obj or .json");
 }
 
 bool is_accuracy_table(const fs::path& path) {
@@ -296,6 +334,12 @@ void print_text(const Report& report) {
     if (value.is_array() && !value.empty() && value[0].is_number()) {
       text.clear();
       for (const auto& number : value) text += (text.empty() ? "" : " x ") + number.dump();
+    }
+    if (key == "drawing" || key == "warnings") {  // one below the other
+      if (value.empty()) continue;
+      text.clear();
+      for (const auto& line : value)
+        text += (text.empty() ? "" : "\n" + std::string(27, ' ')) + line.get<std::string>();
     }
     std::cout << fmt::format("{:<26} {}\n", key, text);
   }

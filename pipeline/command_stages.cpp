@@ -1,8 +1,14 @@
+#include <algorithm>
+#include <memory>
+
 #include "fibers/baked/fabric_pack.h"
+#include "fibers/tracing/tile_scene.h"
 #include "formats/atomic_file.h"
 #include "formats/input_error.h"
 #include "pipeline/commands.h"
 #include "pipeline/job.h"
+#include "pipeline/swatch_picture.h"
+#include "render/tile_preview.h"
 
 namespace heddle {
 namespace {
@@ -52,11 +58,21 @@ void copy_pack(const fs::path& from, const fs::path& to) {
 int stage_command(const StageOptions& options, const CommonOptions& common) {
   Job job(common);
   if (options.output) require_place_for_pack(*options.output);  // before hours of work
+  if (options.preview) require_writable(*options.preview);
   FabricStages stages(options.fabric, job.context());
   std::optional<Artifact> artifact;
   switch (options.target) {
     case StageTarget::kSynth:
       artifact = stages.synth();
+      if (options.preview) {
+        const auto tile = std::make_shared<const TileScene>(read_exemplar(artifact->path));
+        const Exemplar& exemplar = tile->exemplar();
+        constexpr int kPixels = 512;
+        write_swatch(*options.preview,
+                     preview_tile(*tile, std::max(exemplar.width_mm, exemplar.height_mm), kPixels),
+                     kPixels);
+        job.add_artifact(*options.preview);
+      }
       break;
     case StageTarget::kVisibility:
       if (options.shard) {

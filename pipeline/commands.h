@@ -31,11 +31,33 @@ struct StageOptions {
   std::filesystem::path fabric;
   StageTarget target = StageTarget::kPack;
   std::optional<int> order;
-  std::optional<Shard> shard;                   // visibility and transfer
-  std::optional<std::filesystem::path> output;  // pack: a copy outside the cache
+  std::optional<Shard> shard;                    // visibility and transfer
+  std::optional<std::filesystem::path> preview;  // synth: a picture of the tile
+  std::optional<std::filesystem::path> output;   // pack: a copy outside the cache
 };
 /// Prints the path of the artifact.
 int stage_command(const StageOptions& options, const CommonOptions& common);
+
+struct SwatchOptions {
+  std::filesystem::path fabric;
+  std::filesystem::path output;  // .png
+  double width_mm = 4;
+  int pixels = 256;
+  int spp = 16;
+};
+/// A path-traced picture of a fabric, without a scene (swatch_picture.h).
+int swatch_command(const SwatchOptions& options, const CommonOptions& common);
+
+struct CatalogueOptions {
+  std::vector<std::filesystem::path> fabrics;
+  std::filesystem::path output;  // folder
+  int pixels = 256;
+  int spp = 32;
+};
+/// Writes index.html in `output`: of every fabric pictures near and far, its figures, and those of
+/// its data as far as the cache holds them, beside table 1 of Khungurn et al. 2017. Builds the
+/// fibers only.
+int catalogue_command(const CatalogueOptions& options, const CommonOptions& common);
 
 struct RunOptions {
   std::filesystem::path scene;
@@ -106,6 +128,13 @@ struct ChartOptions {
 /// chart.svg, chart-local.svg, index.html and runs/ in `output` (docs/chart.md). Status 1 if every
 /// run failed.
 int chart_command(const ChartOptions& options, const CommonOptions& common);
+
+struct ExportOptions {
+  std::filesystem::path input;   // fabric .toml, fibers .safetensors, or pack
+  std::filesystem::path output;  // .hair, .bcc or .obj
+};
+/// Writes the fibers of a tile as curves in millimetres, each over one period, from end to end.
+int export_command(const ExportOptions& options, const CommonOptions& common);
 
 /// Prints what a file holds.
 int info_command(const std::filesystem::path& path, const CommonOptions& common);

@@ -13,6 +13,7 @@
 #include "fibers/cloth/yarn_paths.h"
 #include "fibers/tracing/tile_scene.h"
 #include "formats/input_error.h"
+#include "pipeline/draft_report.h"
 
 namespace heddle {
 namespace {
@@ -76,8 +77,26 @@ void describe_threads(const FabricConfig& config, const YarnPaths& paths, Report
   report["cover_factor"] = rounded(warp.cover + weft.cover - warp.cover * weft.cover);
   if (warp.grams_per_m2 + weft.grams_per_m2 > 0)
     report["grams_per_m2"] = rounded(warp.grams_per_m2 + weft.grams_per_m2);
-  for (const YarnConfig& yarn : config.yarns)
-    report["yarns"][yarn.name] = yarn_report(yarn, config);
+}
+
+void describe_knit(const KnitConfig& knit, const FabricConfig& config, Report& report) {
+  const double thickest = thickest_yarn_mm(config, knit.sequence);
+  const LoopForm loop = solve_loop(knit, thickest);
+  const double length = loop_length(loop);
+  report["knit"] = knit.structure == KnitStructure::kRib1x1 ? "rib 1x1" : "jersey";
+  report["wales_per_cm"] = rounded(10 * knit.wales_per_mm);
+  report["courses_per_cm"] = rounded(10 * knit.courses_per_mm);
+  report["loop_length_mm"] = rounded(length);
+  // Munden 1959: 19 to 23 in relaxed plain knits.
+  report["loop_constant"] = rounded(knit.wales_per_mm * knit.courses_per_mm * length * length);
+}
+
+void describe_curves(const CurvesConfig& curves, const FabricConfig& config, Report& report) {
+  CurveCut cut;
+  const std::size_t pieces = curves_on_tile(curves, config.segment_mm, &cut).size();
+  report["curves"] = pieces;
+  report["curves_cut_percent"] = rounded(100 * (1 - cut.kept_mm / cut.whole_mm));
+  report["ends_at_the_border"] = cut.ends;
 }
 
 }  // namespace
@@ -111,12 +130,20 @@ void describe_exemplar(const Exemplar& exemplar, std::uint64_t seed, Report& rep
 
 Report fabric_report(const FabricDocument& fabric) {
   const FabricConfig& config = fabric.config;
-  Report report = {
-      {"kind", "fabric config"}, {"name", config.name}, {"weave", config.weave.notation}};
+  Report report = {{"kind", "fabric config"}, {"name", config.name}};
   report["light_from"] = config.light_from_both_sides ? "both" : "face";
   report["seed"] = config.seed;
   try {
-    describe_threads(config, lay_yarns(config), report);
+    if (config.knit) {
+      describe_knit(*config.knit, config, report);
+    } else if (config.curves) {
+      describe_curves(*config.curves, config, report);
+    } else {
+      describe_weave(config.weave, report);
+      describe_threads(config, lay_yarns(config), report);
+    }
+    for (const YarnConfig& yarn : config.yarns)
+      report["yarns"][yarn.name] = yarn_report(yarn, config);
     describe_exemplar(synthesize(config), config.seed, report);
   } catch (const std::invalid_argument& error) {
     throw ConfigError(fmt::format("{}: {}", fabric.file.string(), error.what()));

@@ -64,6 +64,9 @@ struct Options {
   CompareOptions compare;
   ChartOptions chart;
   RunOptions run;
+  SwatchOptions swatch;
+  CatalogueOptions catalogue;
+  ExportOptions curves;
   PlanOptions plan;
 };
 
@@ -122,6 +125,10 @@ void add_stage_command(CLI::App& app, Options& options, const std::string& name,
     command->add_option("-o,--output,--outfile", options.stage.output,
                         "Folder for a copy of the pack outside the cache");
   }
+  if (target == StageTarget::kSynth) {
+    command->add_option("--preview", options.stage.preview,
+                        "A shaded picture of the tile, a .png: quick, without scattered light");
+  }
   if (with_shard) {
     command->add_option(
         "--shard", options.shard,
@@ -142,9 +149,11 @@ const char* kept_after_signal(const std::string& command) {
       {"chart",
        "finished pictures are kept in the chart's folder runs, and the same command with --resume "
        "goes on from them; finished stages and chunks are kept in the cache"},
+      {"catalogue", "finished pictures are kept in the folder; fibers are kept in the cache"},
       {"check", kNothing},
       {"compare", kNothing},
       {"eval", "the answers printed so far are complete"},
+      {"export", kNothing},
       {"info", kNothing},
       {"pack", kStages},
       {"plan", kMeasurement},
@@ -154,6 +163,7 @@ const char* kept_after_signal(const std::string& command) {
       {"run",
        "finished pictures, stages and chunks are kept in the cache, and the same command goes on "
        "from them; a picture that was being rendered is lost"},
+      {"swatch", "the picture is lost; the fibers are kept in the cache"},
       {"synth", kStages},
       {"transfer", kStages},
       {"visibility", kStages},
@@ -208,6 +218,39 @@ void add_stages(CLI::App& app, Options& options, Actions& actions) {
       return stage_command(options.stage, options.common);
     };
   }
+}
+
+void add_swatch(CLI::App& app, Options& options, Actions& actions) {
+  CLI::App* swatch =
+      app.add_subcommand("swatch", "A path-traced picture of a fabric, no scene needed");
+  SwatchOptions& asked = options.swatch;
+  add_building(*swatch, options);
+  add_fabric_seed(*swatch, options);
+  swatch->add_option("FABRIC.toml", asked.fabric, "Fabric config")->required();
+  swatch->add_option("-o,--output,--outfile", asked.output, "The .png")->required();
+  swatch->add_option("--width-mm", asked.width_mm, "Cloth across the picture; 4 by default")
+      ->check(CLI::Range(0.01, 1000.0));
+  swatch->add_option("--pixels", asked.pixels, "Along each side; 256 by default")
+      ->check(CLI::Range(1, 4096));
+  swatch->add_option("--spp", asked.spp, "Samples per pixel, even; 16 by default")
+      ->check(CLI::Range(2, 1 << 20));
+  actions["swatch"] = [&options] { return swatch_command(options.swatch, options.common); };
+}
+
+void add_catalogue(CLI::App& app, Options& options, Actions& actions) {
+  CLI::App* catalogue =
+      app.add_subcommand("catalogue", "A page of fabrics: pictures near and far, and figures");
+  CatalogueOptions& asked = options.catalogue;
+  add_building(*catalogue, options);
+  catalogue->add_option("FABRIC.toml", asked.fabrics, "Fabric configs")->required();
+  catalogue->add_option("-o,--output,--outfile", asked.output, "Folder of the page")->required();
+  catalogue->add_option("--pixels", asked.pixels, "Along each side of a picture; 256 by default")
+      ->check(CLI::Range(1, 4096));
+  catalogue->add_option("--spp", asked.spp, "Samples per pixel, even; 32 by default")
+      ->check(CLI::Range(2, 1 << 20));
+  actions["catalogue"] = [&options] {
+    return catalogue_command(options.catalogue, options.common);
+  };
 }
 
 void add_render(CLI::App& app, Options& options, Actions& actions) {
@@ -325,10 +368,26 @@ void add_info(CLI::App& app, Options& options, Actions& actions) {
   add_fabric_seed(*info, options);
   info->add_option(
           "PATH", options.path,
-          "Fabric or scene .toml, pack, .safetensors, .vdb, .exr, .hdr, .png, .obj, or one of "
-          "our .json files")
+          "Fabric or scene .toml, pack, draft .wif, curves .bcc, .hair and .obj, .safetensors, "
+          ".vdb, .exr, .hdr, .png, .obj, or one of our .json files")
       ->required();
   actions["info"] = [&options] { return info_command(options.path, options.common); };
+}
+
+void add_export(CLI::App& app, Options& options, Actions& actions) {
+  CLI::App* command = app.add_subcommand(
+      "export", "The fibers of a tile as curves in millimetres, for other programs");
+  add_common(*command, options);
+  add_fabric_seed(*command, options);
+  command
+      ->add_option("INPUT", options.curves.input,
+                   "Fabric .toml, its fibers .safetensors, or a pack")
+      ->required();
+  command
+      ->add_option("-o,--output,--outfile", options.curves.output,
+                   "File .hair, .bcc or .obj (lines)")
+      ->required();
+  actions["export"] = [&options] { return export_command(options.curves, options.common); };
 }
 
 void add_check(CLI::App& app, Options& options, Actions& actions) {
@@ -344,11 +403,14 @@ Actions add_commands(CLI::App& app, Options& options) {
   Actions actions;
   add_run(app, options, actions);
   add_stages(app, options, actions);
+  add_swatch(app, options, actions);
+  add_catalogue(app, options, actions);
   add_render(app, options, actions);
   add_eval(app, actions);
   add_compare(app, options, actions);
   add_plan(app, options, actions);
   add_chart(app, options, actions);
+  add_export(app, options, actions);
   add_info(app, options, actions);
   add_check(app, options, actions);
   return actions;

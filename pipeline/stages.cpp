@@ -313,6 +313,7 @@ Artifact FabricStages::synth() {
   const Stage stage = synth_stage();
   return artifact_of(stage, [&](const fs::path& path, StageResult&) {
     const FabricConfig& config = document_.config;
+    for (const std::string& warning : config.weave.warnings) context_->console->warn(warning);
     try {
       warn_of_crowded_yarns(config, *context_->console);
       const ExemplarForecast forecast = forecast_exemplar(config);

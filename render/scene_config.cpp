@@ -164,7 +164,8 @@ SurfaceFabric read_surface(const TomlTable& table, const char* key) {
     }
     return surface_preset(name);
   }();
-  SurfaceFabric fabric{name, document.canonical_text(), read_surface_model(document), {}};
+  SurfaceFabric fabric{name, "", read_surface_model(document), {}};
+  fabric.text = document.canonical_text();  // once read: a draft stands in it by its content
   if (document.string("model") == "microcylinder") {
     const MicrocylinderFabric threads = read_microcylinder_fabric(document);
     if (!threads.energy_safe) fabric.interactive = threads;

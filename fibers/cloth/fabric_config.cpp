@@ -4,12 +4,14 @@
 
 #include <algorithm>
 #include <charconv>
+#include <map>
 #include <numeric>
 #include <optional>
 #include <stdexcept>
 #include <utility>
 
 #include "fibers/cloth/exemplar.h"
+#include "fibers/cloth/weave_config.h"
 
 namespace heddle {
 namespace {
@@ -87,6 +89,35 @@ struct SystemKeys {
   int repeat_count;
 };
 
+/// Every thread of the weave's repeat in the colour that the draft gives it.
+void take_draft_colors(const TomlTable& table, const SystemKeys& keys, FabricConfig& config,
+                       ThreadSystem& system) {
+  const bool is_warp = std::string_view(keys.table) == "warp";
+  const DraftThreads& threads = is_warp ? config.weave.warp : config.weave.weft;
+  if (threads.color.empty())
+    table.fail("colors", "expected a [weave] draft that gives its threads colours");
+  if (keys.of_weave % static_cast<int>(system.sequence.size()) != 0) {
+    table.fail("sequence", fmt::format("expected a length that divides the {} threads of the draft",
+                                       keys.of_weave));
+  }
+  std::map<std::pair<int, int>, int> dyed;  // by yarn and fiber
+  std::vector<int> sequence;
+  for (int k = 0; k < keys.of_weave; ++k) {
+    const int plain = system.yarn_at(k);
+    YarnConfig yarn = config.yarns[static_cast<std::size_t>(plain)];
+    const std::array<float, 3>& color = threads.color[static_cast<std::size_t>(k)];
+    yarn.fiber = dyed_fiber(yarn.fiber, Rgbd(color[0], color[1], color[2]), config.fibers);
+    const auto [found, is_new] =
+        dyed.try_emplace({plain, yarn.fiber}, static_cast<int>(config.yarns.size()));
+    if (is_new) {
+      yarn.name += fmt::format(" in colour {}", dyed.size());
+      config.yarns.push_back(std::move(yarn));
+    }
+    sequence.push_back(found->second);
+  }
+  system.sequence = std::move(sequence);
+}
+
 ThreadSystem read_system(const TomlTable& document, const SystemKeys& keys, FabricConfig& config) {
   const TomlTable table = document.table(keys.table);
   const TomlTable weave = document.table("weave");
@@ -96,6 +127,10 @@ ThreadSystem read_system(const TomlTable& document, const SystemKeys& keys, Fabr
   if (table.has("per_cm") && table.has("spacing_mm"))
     table.fail("per_cm", "expected either per_cm or spacing_mm");
   system.sequence = read_sequence(table, keys.table, config);
+  if (table.has("colors")) {
+    table.choice("colors", {"draft"});
+    take_draft_colors(table, keys, config, system);
+  }
   const int count = keys.of_weave * keys.repeat_count;
   if (count % static_cast<int>(system.sequence.size()) != 0) {
     weave.fail(keys.repeats,
@@ -123,7 +158,45 @@ ThreadSystem read_system(const TomlTable& document, const SystemKeys& keys, Fabr
   return system;
 }
 
+void read_woven(const TomlTable& document, FabricConfig& config) {
+  const TomlTable weave = document.table("weave");
+  config.weave = read_weave(weave);
+  config.repeats_x = static_cast<int>(weave.integer("repeats_x", 1, 64));
+  config.repeats_y = static_cast<int>(weave.integer("repeats_y", 1, 64));
+  config.crimp_warp = weave.number("crimp_warp", {.min = 0, .max = 1}, 0.5);
+  config.warp =
+      read_system(document, {"warp", "repeats_x", config.weave.ends, config.repeats_x}, config);
+  config.weft =
+      read_system(document, {"weft", "repeats_y", config.weave.picks, config.repeats_y}, config);
+}
+
+int fiber_named(const TomlTable& table, const FabricConfig& config) {
+  const std::string name = table.string("fiber");
+  std::string known;
+  for (std::size_t k = 0; k < config.fibers.size(); ++k) {
+    if (config.fibers[k].name == name) return static_cast<int>(k);
+    known += (known.empty() ? "" : ", ") + config.fibers[k].name;
+  }
+  table.fail("fiber", "expected the name of a [fiber.NAME] table: " + known);
+}
+
+void read_found(const TomlTable& table, FabricConfig& config) {
+  config.curves = read_curves_config(table);
+  if (config.curves->as_yarns) {
+    config.curves->sequence = read_sequence(table, "curves", config);
+  } else {
+    config.curves->fiber = fiber_named(table, config);
+  }
+}
+
 }  // namespace
+
+double thickest_yarn_mm(const FabricConfig& config, const std::vector<int>& yarns) {
+  double thickest = 0;
+  for (const int k : yarns)
+    thickest = std::max({thickest, config.yarn(k).width_mm, config.yarn(k).height_mm});
+  return thickest;
+}
 
 FabricConfig read_fabric_config(const TomlTable& document) {
   FabricConfig config;
@@ -131,21 +204,6 @@ FabricConfig read_fabric_config(const TomlTable& document) {
   config.seed = static_cast<std::uint64_t>(document.integer("seed", 0, 1'000'000'000, 1));
   config.light_from_both_sides = document.choice("light_from", {"face", "both"}, "face") == "both";
   config.segment_mm = kMmPerUm * document.number("segment_um", {.min = 1, .max = 10000});
-
-  const TomlTable weave = document.table("weave");
-  const std::string notation = weave.string("notation");
-  WeaveFace face = WeaveFace::kWarp;
-  if (notation.starts_with("satin")) {
-    face = weave.choice("face", {"warp", "weft"}) == "warp" ? WeaveFace::kWarp : WeaveFace::kWeft;
-  }
-  try {
-    config.weave = parse_weave(notation, face);
-  } catch (const std::invalid_argument& error) {
-    weave.fail("notation", error.what());
-  }
-  config.repeats_x = static_cast<int>(weave.integer("repeats_x", 1, 64));
-  config.repeats_y = static_cast<int>(weave.integer("repeats_y", 1, 64));
-  config.crimp_warp = weave.number("crimp_warp", {.min = 0, .max = 1}, 0.5);
 
   const TomlTable fibers = document.table("fiber");
   for (const std::string& name : fibers.table_names())
@@ -161,10 +219,18 @@ FabricConfig read_fabric_config(const TomlTable& document) {
           table.optional_number("spacing_mm", {.min = 1e-3, .max = 100}).value_or(0);
     }
   }
-  config.warp =
-      read_system(document, {"warp", "repeats_x", config.weave.ends, config.repeats_x}, config);
-  config.weft =
-      read_system(document, {"weft", "repeats_y", config.weave.picks, config.repeats_y}, config);
+  if (document.has("knit")) {
+    config.knit = read_knit(document.table("knit"));
+    config.knit->sequence = read_sequence(document.table("knit"), "knit", config);
+  } else if (document.has("curves")) {
+    read_found(document.table("curves"), config);
+  } else {
+    read_woven(document, config);
+  }
+  if (const auto pile = document.optional_table("pile")) {
+    config.pile = read_pile(*pile);
+    config.pile->fiber = fiber_named(*pile, config);
+  }
   if (config.fibers.size() > kMaxMaterials) {
     document.fail("yarn", fmt::format("expected at most {} fibers in different colours, found {}",
                                       kMaxMaterials, config.fibers.size()));

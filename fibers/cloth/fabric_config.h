@@ -5,9 +5,13 @@
 // tests/fibers/cloth/fabric_config_test.cpp.
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "fibers/cloth/curve_exemplar.h"
+#include "fibers/cloth/knit.h"
+#include "fibers/cloth/pile.h"
 #include "fibers/cloth/weave.h"
 #include "fibers/cloth/yarn_config.h"
 #include "formats/toml_table.h"
@@ -37,9 +41,17 @@ struct FabricConfig {
   std::vector<YarnConfig> yarns;
   ThreadSystem warp;
   ThreadSystem weft;
+  // Instead of a weave with its warp and weft:
+  std::optional<KnitConfig> knit;
+  std::optional<CurvesConfig> curves;
+  std::optional<PileConfig> pile;      // on any of them
   bool light_from_both_sides = false;  // light_from = "face" | "both"
   std::uint64_t seed = 1;
 
+  const YarnConfig& yarn(int k) const { return yarns[static_cast<std::size_t>(k)]; }
+  const FiberType& fiber_of(const YarnConfig& yarn) const {
+    return fibers[static_cast<std::size_t>(yarn.fiber)];
+  }
   const YarnConfig& warp_yarn(int end) const {
     return yarns[static_cast<std::size_t>(warp.yarn_at(end))];
   }
@@ -47,6 +59,9 @@ struct FabricConfig {
     return yarns[static_cast<std::size_t>(weft.yarn_at(pick))];
   }
 };
+
+/// Larger side of the largest section among these yarns.
+double thickest_yarn_mm(const FabricConfig& config, const std::vector<int>& yarns);
 
 /// Reads the keys that describe the cloth ([weave], [warp], [weft], [fiber.NAME], name, light_from,
 /// seed). The caller reads the other sections and calls finish() on the document.

@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "fibers/cloth/fibers_of_yarn.h"
+#include "fibers/cloth/sampled_line.h"
 #include "fibers/cloth/yarn_paths.h"
 #include "formats/memory_need.h"
 
@@ -18,24 +19,88 @@ namespace {
 constexpr double kPointBytesPerSegment = 3 * 20;
 constexpr double kMostSegments = 0x1p31;
 
+using AddYarn = std::function<void(const YarnConfig&, const CentreLine&)>;
+
+void add_courses(const FabricConfig& config, Exemplar& exemplar, const AddYarn& add_yarn) {
+  const KnitConfig& knit = *config.knit;
+  exemplar.width_mm = static_cast<float>(knit.width_mm());
+  exemplar.height_mm = static_cast<float>(knit.height_mm());
+  const LoopForm loop = solve_loop(knit, thickest_yarn_mm(config, knit.sequence));
+  for (int course = 0; course < knit.courses; ++course) {
+    const YarnConfig& yarn = config.yarn(knit.yarn_of(course));
+    add_yarn(yarn, centre_line_of_course(loop, knit, course, yarn.width_mm, yarn.height_mm));
+  }
+}
+
+void add_curves(const FabricConfig& config, Exemplar& exemplar, const AddYarn& add_yarn) {
+  const CurvesConfig& curves = *config.curves;
+  exemplar.width_mm = static_cast<float>(curves.size_mm[0]);
+  exemplar.height_mm = static_cast<float>(curves.size_mm[1]);
+  for (const TileCurve& curve : curves_on_tile(curves, config.segment_mm, nullptr)) {
+    if (curves.as_yarns) {
+      const YarnConfig& yarn = config.yarn(curves.yarn_of(curve.curve));
+      add_yarn(yarn, sampled_line(curve.points, steady_ups(curve.points, curve.is_open),
+                                  yarn.width_mm, yarn.height_mm, curve.is_open));
+      continue;
+    }
+    for (const Vec3d& point : curve.points) exemplar.points.push_back(point.cast<float>());
+    exemplar.first_point.push_back(static_cast<std::uint32_t>(exemplar.points.size()));
+    exemplar.radius_mm.push_back(static_cast<float>(
+        curves.radius_mm(curve, config.fibers[static_cast<std::size_t>(curves.fiber)].radius_mm)));
+    exemplar.material.push_back(static_cast<std::uint16_t>(curves.fiber));
+    exemplar.yarn.push_back(static_cast<std::uint32_t>(curve.curve));
+    exemplar.is_open.push_back(curve.is_open ? 1 : 0);
+  }
+}
+
+// The last point of a fiber that goes on is its first, one period on, to the last bit.
+void close_periods(Exemplar& exemplar) {
+  for (std::size_t f = 0; f < exemplar.fiber_count(); ++f) {
+    if (exemplar.is_open[f] != 0) continue;
+    const Vec3& first = exemplar.points[exemplar.first_point[f]];
+    Vec3& last = exemplar.points[exemplar.first_point[f + 1] - 1];
+    const Vec3 on = last - first;
+    const bool along_x = std::abs(on.x()) > std::abs(on.y());
+    last = first + (along_x ? Vec3(std::copysign(exemplar.width_mm, on.x()), 0, 0)
+                            : Vec3(0, std::copysign(exemplar.height_mm, on.y()), 0));
+  }
+}
+
 }  // namespace
 
 ExemplarForecast forecast_exemplar(const FabricConfig& config) {
-  const double width = warp_places(config).period_mm;
-  const double height = weft_places(config).period_mm;
   ExemplarForecast forecast;
-  const auto add_system = [&](const ThreadSystem& system, double yarns, double period_mm) {
-    // Whole sequences fill the tile.
-    for (const int k : system.sequence) {
-      const YarnConfig& yarn = config.yarns[static_cast<std::size_t>(k)];
-      forecast.segments += yarns / static_cast<double>(system.sequence.size()) * yarn.plies *
-                           yarn.fibers_per_ply *
-                           segments_per_fiber(yarn, period_mm, config.segment_mm);
-    }
-    forecast.yarns += static_cast<std::uint64_t>(yarns);
+  const auto add_yarn = [&](const YarnConfig& yarn, double length_mm) {
+    forecast.segments += segments_of_yarn(yarn, length_mm, config.segment_mm);
+    ++forecast.yarns;
   };
-  add_system(config.warp, static_cast<double>(config.weave.ends) * config.repeats_x, height);
-  add_system(config.weft, static_cast<double>(config.weave.picks) * config.repeats_y, width);
+  double area = 0;
+  if (config.knit) {
+    const KnitConfig& knit = *config.knit;
+    area = knit.width_mm() * knit.height_mm();
+    for (int course = 0; course < knit.courses; ++course)
+      add_yarn(config.yarn(knit.yarn_of(course)), knit.wales * usual_loop_length(knit));
+  } else if (config.curves) {
+    area = config.curves->size_mm[0] * config.curves->size_mm[1];
+    for (const TileCurve& curve : curves_on_tile(*config.curves, config.segment_mm, nullptr)) {
+      if (config.curves->as_yarns) {
+        add_yarn(config.yarn(config.curves->yarn_of(curve.curve)), length_of(curve));
+      } else {
+        forecast.segments += static_cast<double>(curve.points.size() - 1);
+      }
+    }
+  } else {
+    const double width = warp_places(config).period_mm;
+    const double height = weft_places(config).period_mm;
+    area = width * height;
+    // Whole sequences fill the tile.
+    const auto add_system = [&](const ThreadSystem& system, int count, double period_mm) {
+      for (int k = 0; k < count; ++k) add_yarn(config.yarn(system.yarn_at(k)), period_mm);
+    };
+    add_system(config.warp, config.weave.ends * config.repeats_x, height);
+    add_system(config.weft, config.weave.picks * config.repeats_y, width);
+  }
+  if (config.pile) forecast.segments += segments_of_pile(*config.pile, area, config.segment_mm);
   forecast.bytes = kPointBytesPerSegment * forecast.segments;
   return forecast;
 }
@@ -51,34 +116,36 @@ Exemplar synthesize(const FabricConfig& config, const std::function<void()>& yar
   }
   require_memory(static_cast<std::uint64_t>(forecast.bytes),
                  fmt::format("fibers of {:.3g} segments", forecast.segments));
-  const YarnPaths paths = lay_yarns(config);
   Exemplar exemplar;
-  exemplar.width_mm = static_cast<float>(paths.width_mm);
-  exemplar.height_mm = static_cast<float>(paths.height_mm);
   for (const FiberType& fiber : config.fibers) exemplar.scattering.push_back(fiber.scattering);
   exemplar.first_point.push_back(0);
   // fibers have a point more than segments
   exemplar.points.reserve(static_cast<std::size_t>(1.25 * forecast.segments));
   std::uint32_t yarn_index = 0;
-  const auto add_system = [&](const ThreadSystem& system, const std::vector<YarnPath>& paths) {
-    for (std::size_t k = 0; k < paths.size(); ++k) {
-      const YarnConfig& yarn =
-          config.yarns[static_cast<std::size_t>(system.yarn_at(static_cast<int>(k)))];
-      add_fibers_of_yarn(yarn, config.fibers[static_cast<std::size_t>(yarn.fiber)].radius_mm,
-                         centre_line(paths[k]), config.segment_mm, config.seed, yarn_index++,
-                         exemplar);
-      yarn_done();
-    }
+  const auto add_yarn = [&](const YarnConfig& yarn, const CentreLine& line) {
+    add_fibers_of_yarn(yarn, config.fiber_of(yarn).radius_mm, line, config.segment_mm, config.seed,
+                       yarn_index++, exemplar);
+    yarn_done();
   };
-  add_system(config.warp, paths.warp);
-  add_system(config.weft, paths.weft);
-  // The last point of a fiber that goes on is its first, one period on, to the last bit.
-  for (std::size_t f = 0; f < exemplar.fiber_count(); ++f) {
-    if (exemplar.is_open[f] != 0) continue;
-    const Vec3& first = exemplar.points[exemplar.first_point[f]];
-    Vec3& last = exemplar.points[exemplar.first_point[f + 1] - 1];
-    const bool along_x = last.x() - first.x() > last.y() - first.y();
-    last = first + (along_x ? Vec3(exemplar.width_mm, 0, 0) : Vec3(0, exemplar.height_mm, 0));
+  if (config.knit) {
+    add_courses(config, exemplar, add_yarn);
+  } else if (config.curves) {
+    add_curves(config, exemplar, add_yarn);
+  } else {
+    const YarnPaths paths = lay_yarns(config);
+    exemplar.width_mm = static_cast<float>(paths.width_mm);
+    exemplar.height_mm = static_cast<float>(paths.height_mm);
+    const auto add_system = [&](const ThreadSystem& system, const std::vector<YarnPath>& lines) {
+      for (std::size_t k = 0; k < lines.size(); ++k)
+        add_yarn(config.yarn(system.yarn_at(static_cast<int>(k))), centre_line(lines[k]));
+    };
+    add_system(config.warp, paths.warp);
+    add_system(config.weft, paths.weft);
+  }
+  close_periods(exemplar);
+  if (config.pile) {
+    add_pile(*config.pile, config.fibers[static_cast<std::size_t>(config.pile->fiber)].radius_mm,
+             config.segment_mm, config.seed, yarn_index, exemplar);
   }
   index_segments(exemplar);
   return exemplar;
@@ -92,6 +159,7 @@ ExemplarSummary summarize(const Exemplar& exemplar) {
   const double area = static_cast<double>(exemplar.width_mm) * exemplar.height_mm;
   double length = 0;
   double volume = 0;
+  double length_going_on = 0;
   double squared_angle = 0;
   for (std::uint32_t s = 0; s < exemplar.segment_count(); ++s) {
     const std::uint32_t p = exemplar.segment_point[s];
@@ -101,16 +169,18 @@ ExemplarSummary summarize(const Exemplar& exemplar) {
     const double r = exemplar.radius_mm[f];
     const Vec3 period =
         exemplar.points[exemplar.first_point[f + 1] - 1] - exemplar.points[exemplar.first_point[f]];
-    const double in_plane =
-        period.x() > period.y() ? std::atan2(d.y(), d.x()) : std::atan2(d.x(), d.y());
     length += l;
     volume += l * kPi * r * r;
+    if (exemplar.is_open[f] != 0) continue;
+    const double in_plane = std::abs(period.x()) > std::abs(period.y()) ? std::atan2(d.y(), d.x())
+                                                                        : std::atan2(d.x(), d.y());
+    length_going_on += l;
     squared_angle += l * in_plane * in_plane;
   }
   summary.mean_segment_mm = length / static_cast<double>(summary.segments);
   summary.areal_fiber_length_per_mm2 = length / area;
   summary.volume_fraction = volume / (area * summary.thickness_mm);
-  summary.wander_rms_deg = degrees(std::sqrt(squared_angle / length));
+  summary.wander_rms_deg = degrees(std::sqrt(squared_angle / std::max(length_going_on, 1e-9)));
   return summary;
 }
 

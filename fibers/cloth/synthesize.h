@@ -33,7 +33,7 @@ struct ExemplarSummary {
   double volume_fraction = 0;  // fiber volume / (tile area x thickness)
   double mean_segment_mm = 0;
   double areal_fiber_length_per_mm2 = 0;  // mm of fiber per mm^2 of cloth
-  // rms angle of fiber segments against the yarn's own direction in the plane
+  // rms angle of fiber segments against the yarn's own direction in the plane, without open fibers
   double wander_rms_deg = 0;
 };
 ExemplarSummary summarize(const Exemplar& exemplar);

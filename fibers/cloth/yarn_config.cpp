@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "fibers/cloth/yarn_count.h"
+#include "fibers/cloth/yarn_file.h"
 
 namespace heddle {
 namespace {
@@ -112,7 +113,7 @@ void read_section(const TomlTable& table, bool has_count, const FiberType& fiber
     const bool is_staple = table.choice("form", {"staple", "filament"}, "staple") == "staple";
     const std::optional<double> packing =
         table.optional_number("packing", {.min = 0.05, .max = 0.9});
-    const double flattening = table.number("flattening", {.min = 1, .max = 20}, 1);
+    const double flattening = table.number("flattening", {.min = 0.2, .max = 20}, 1);
     const double area = yarn.plies * yarn.fibers_per_ply * kPi * fiber.radius_mm * fiber.radius_mm /
                         packing.value_or(is_staple ? kStaplePacking : kFilamentPacking);
     const double diameter = 2 * std::sqrt(area / kPi);
@@ -150,17 +151,14 @@ FiberType read_fiber(const TomlTable& table, const std::string& name) {
   return fiber;
 }
 
-int fiber_in_colors(int fiber, const Rgbd& color_r, const Rgbd& color_tt,
-                    std::vector<FiberType>& fibers) {
+int dyed_fiber(int fiber, const Rgbd& color, std::vector<FiberType>& fibers) {
   FiberType dyed = fibers[static_cast<std::size_t>(fiber)];
+  dyed.scattering.color_tt = (4 * color / (1 + color).square()).min(1.0);
   const auto is_like = [&](const FiberType& other) {
-    return other.name == dyed.name && (other.scattering.color_r == color_r).all() &&
-           (other.scattering.color_tt == color_tt).all();
+    return other.name == dyed.name && (other.scattering.color_tt == dyed.scattering.color_tt).all();
   };
   const auto found = std::find_if(fibers.begin(), fibers.end(), is_like);
   if (found != fibers.end()) return static_cast<int>(found - fibers.begin());
-  dyed.scattering.color_r = color_r;
-  dyed.scattering.color_tt = color_tt;
   fibers.push_back(std::move(dyed));
   return static_cast<int>(fibers.size()) - 1;
 }
@@ -170,17 +168,22 @@ double fill_of(const YarnConfig& yarn, const FiberType& fiber) {
          (yarn.width_mm * yarn.height_mm);
 }
 
+double YarnConfig::round_radius_mm(double fiber_radius_mm) const {
+  if (ply_mm) return reach_of(*ply_mm);
+  return std::sqrt((0.5 * width_mm - fiber_radius_mm) * (0.5 * height_mm - fiber_radius_mm));
+}
+
 YarnConfig read_yarn(const TomlTable& table, const std::string& name,
                      std::vector<FiberType>& fibers) {
   YarnConfig yarn;
   yarn.name = name;
   yarn.fiber = find_fiber(table, fibers);
   const FiberType fiber = fibers[static_cast<std::size_t>(yarn.fiber)];
-  if (table.has("color_r") || table.has("color_tt")) {
-    const FiberScattering& own = fiber.scattering;
-    yarn.fiber = fiber_in_colors(
-        yarn.fiber, table.has("color_r") ? read_color(table, "color_r") : own.color_r,
-        table.has("color_tt") ? read_color(table, "color_tt") : own.color_tt, fibers);
+  if (table.has("color")) yarn.fiber = dyed_fiber(yarn.fiber, read_color(table, "color"), fibers);
+  yarn.contact_flattening = table.number("contact_flattening", {.min = 0, .max = 0.5}, 0);
+  if (table.has("from")) {
+    read_yarn_file(table, fiber.radius_mm, yarn);
+    return yarn;
   }
   std::optional<YarnCount> count;
   if (table.has("count")) {
@@ -192,12 +195,12 @@ YarnConfig read_yarn(const TomlTable& table, const std::string& name,
   }
   read_fibers_per_ply(table, count, fiber, yarn);
   read_section(table, count.has_value(), fiber, yarn);
-  yarn.contact_flattening = table.number("contact_flattening", {.min = 0, .max = 0.5}, 0);
   const NumberRange twist{.min = -5000, .max = 5000};
   yarn.yarn_turns_per_mm = 1e-3 * table.number("yarn_twist_per_m", twist);
   yarn.ply_turns_per_mm = 1e-3 * table.number("ply_twist_per_m", twist);
   yarn.migration = table.number("migration", {.min = 0, .max = 1});
   yarn.wander_rms = radians(table.number("wander_rms_deg", {.min = 0, .max = 30}));
+  read_irregularities(table, yarn);
   return yarn;
 }
 

@@ -4,9 +4,12 @@
 // Lengths in millimetres, angles in radians after parsing. Tested in
 // tests/fibers/cloth/yarn_config_test.cpp.
 
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "fibers/cloth/flyaways.h"
+#include "fibers/cloth/yarn_section.h"
 #include "fibers/scattering/fiber_bcsdf.h"
 #include "formats/toml_table.h"
 
@@ -37,21 +40,38 @@ struct YarnConfig {
   double ply_turns_per_mm = 0;  // twist of the fibers about their ply, likewise
   // relative depth of radial migration, 0 .. 1 (Zhao et al. 2016: 1 - rho_min)
   double migration = 0;
+  // waves of migration per turn of a fiber about its ply; snapped to whole waves per tile, at least
+  // one
+  double migration_per_turn = 1;
   // rms angle (radians) of irregular fiber wander against the ideal helix
   double wander_rms = 0;
+  // Ellipses of the plies of the round yarn, in mm, of the fibers' axes. Without it plies are
+  // circles that fill the section.
+  std::optional<PlyShape> ply_mm;
+  RadialDensity density;
+  Hairs hairs;
+  Loops loops;
+  std::vector<Slubs> slubs;
+  Neps neps;
+
+  /// Radius (mm) of the round yarn, up to the axes of its outermost fibers. Woven, its section is
+  /// flattened to width_mm x height_mm; flyaways keep their lengths.
+  double round_radius_mm(double fiber_radius_mm) const;
 };
 
 /// Reads a table [fiber.NAME].
 FiberType read_fiber(const TomlTable& table, const std::string& name);
 
-/// Reads the keys of one yarn from a table [yarn.NAME], [warp] or [weft]. A yarn with colours of
-/// its own adds a fiber type.
+/// Reads the keys of one yarn from a table [yarn.NAME], [warp] or [weft]. They may stand in a file
+/// of their own, named by `from`. A yarn with colours of its own adds a fiber type.
 YarnConfig read_yarn(const TomlTable& table, const std::string& name,
                      std::vector<FiberType>& fibers);
 
-/// The fiber type `fiber` in other colours; found among `fibers` or added to them.
-int fiber_in_colors(int fiber, const Rgbd& color_r, const Rgbd& color_tt,
-                    std::vector<FiberType>& fibers);
+/// The fiber type `fiber`, dyed so that thick cloth of it shows about the colour (linear rgb) in even
+/// light; found among `fibers` or added to them. Deep layers of scatterers of albedo a reflect
+/// R = (1 - g) / (1 + g), g = sqrt(1 - a) (diffusive reflectance, Hapke 1981), so color_tt becomes
+/// 4 R / (1 + R)^2. The surface's own reflection, color_r, stays.
+int dyed_fiber(int fiber, const Rgbd& color, std::vector<FiberType>& fibers);
 
 /// Share of the area of a yarn's section that its fibers fill; above 0.9 no real fibers fit.
 double fill_of(const YarnConfig& yarn, const FiberType& fiber);

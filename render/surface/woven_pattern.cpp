@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <sstream>
 #include <stdexcept>
 #include <string>
+
+#include "fibers/cloth/weave_config.h"
+#include "formats/memory_need.h"
 
 namespace heddle {
 namespace {
@@ -29,31 +31,41 @@ int interval(const std::vector<double>& edges, double coordinate) {
                     static_cast<int>(edges.size()) - 2);
 }
 
-// Rows of 0 and 1 with spaces between them, the top row (the last pick) first.
-Weave parse_matrix(const std::string& text) {
-  Weave weave;
-  weave.notation = text;
-  std::vector<std::string> rows;
-  std::istringstream stream(text);
-  for (std::string row; stream >> row;) rows.push_back(row);
-  if (rows.empty() || rows.size() > 64 || rows[0].size() > 64) {
-    throw std::invalid_argument("expected 1 to 64 rows of 1 to 64 crossings");
-  }
-  weave.ends = static_cast<int>(rows[0].size());
-  weave.picks = static_cast<int>(rows.size());
-  for (auto row = rows.rbegin(); row != rows.rend(); ++row) {
-    if (row->size() != rows[0].size() || row->find_first_not_of("01") != std::string::npos) {
-      throw std::invalid_argument(
-          "expected rows of equal length of 0 (weft on top) and 1 (warp on top), such as \"10 "
-          "01\"");
-    }
-    for (const char crossing : *row) weave.warp_up.push_back(crossing == '1' ? 1 : 0);
-  }
-  return weave;
+// Crossings along one axis of the endless cloth, counted through all repeats.
+struct CrossingRange {
+  std::int64_t first;
+  std::int64_t last;
+  std::int64_t count() const { return last - first + 1; }
+};
+
+// Those that share length with [min, max], and perhaps one more at either end.
+CrossingRange crossings_within(const std::vector<double>& edges, double min, double max) {
+  const auto count = static_cast<std::int64_t>(edges.size()) - 1;
+  const auto crossing = [&](double coordinate) {
+    const double repeat = std::floor(coordinate / edges.back());
+    return static_cast<std::int64_t>(repeat) * count +
+           interval(edges, coordinate - repeat * edges.back());
+  };
+  return {crossing(min) - 1, crossing(max) + 1};
 }
 
+struct CrossingPlace {
+  std::int64_t repeat;
+  std::size_t index;  // within the repeat
+};
+
+CrossingPlace place_of(std::int64_t crossing, std::size_t count) {
+  const auto n = static_cast<std::int64_t>(count);
+  const std::int64_t repeat = crossing >= 0 ? crossing / n : (crossing - n + 1) / n;
+  return {repeat, static_cast<std::size_t>(crossing - repeat * n)};
+}
+
+// Looking up a crossing takes as long as trying this many floats.
+constexpr double kFewCrossings = 0.25;
+
 std::vector<double> read_widths(const TomlTable& section, const char* key, int yarns) {
-  const std::vector<double> cycle = section.numbers(key, {.min = 0.01, .max = 100}, 1, 64);
+  const std::vector<double> cycle =
+      section.numbers(key, {.min = 0.01, .max = 100}, 1, kMaxWeaveExtent);
   if (yarns % static_cast<int>(cycle.size()) != 0) {
     section.fail(
         key, fmt::format("expected a list whose length divides the {} yarns of the repeat", yarns));
@@ -69,6 +81,11 @@ std::vector<double> read_widths(const TomlTable& section, const char* key, int y
 WovenPattern::WovenPattern(const Weave& weave, const std::vector<double>& end_widths,
                            const std::vector<double>& pick_widths)
     : x_(edges_of(end_widths)), y_(edges_of(pick_widths)) {
+  const auto crossings =
+      static_cast<std::uint64_t>(weave.ends) * static_cast<std::uint64_t>(weave.picks);
+  // A list that grows holds its old items as well while it moves.
+  require_memory(crossings * (sizeof(int) + 3 * sizeof(WovenFloat)),
+                 fmt::format("a surface of {} x {} crossings", weave.ends, weave.picks));
   repeat_ = {x_.back(), y_.back()};
   float_at_.assign(static_cast<std::size_t>(weave.ends) * static_cast<std::size_t>(weave.picks),
                    -1);
@@ -158,19 +175,42 @@ void WovenPattern::visit(
   const auto repeat_of = [this](double coordinate, int axis) {
     return static_cast<std::int64_t>(std::floor(coordinate / repeat_[axis]));
   };
+  const auto visit_float = [&](std::int64_t j, std::int64_t i, const WovenFloat& segment) {
+    const Vec2d origin(static_cast<double>(i) * repeat_.x(), static_cast<double>(j) * repeat_.y());
+    const Vec2d corner = origin + segment.corner;
+    const Rectangle clip = {(rectangle.min - corner).cwiseMax(0.0),
+                            (rectangle.max - corner).cwiseMin(segment.size)};
+    if ((clip.min.array() >= clip.max.array()).any()) return;
+    visitor({&segment, i, j, corner}, clip);
+  };
+  const CrossingRange x = crossings_within(x_, rectangle.min.x(), rectangle.max.x());
+  const CrossingRange y = crossings_within(y_, rectangle.min.y(), rectangle.max.y());
+  // Few crossings of a large repeat: only the floats that lie on them, in the order of the loop
+  // below.
+  if (static_cast<double>(x.count()) * static_cast<double>(y.count()) <
+      kFewCrossings * static_cast<double>(floats_.size())) {
+    std::vector<std::array<std::int64_t, 3>> found;  // repeat along y, along x, float
+    for (std::int64_t pick = y.first; pick <= y.last; ++pick) {
+      for (std::int64_t end = x.first; end <= x.last; ++end) {
+        const CrossingPlace along_x = place_of(end, x_.size() - 1);
+        const CrossingPlace along_y = place_of(pick, y_.size() - 1);
+        const int id = float_at_[along_y.index * (x_.size() - 1) + along_x.index];
+        const WovenFloat& segment = floats_[static_cast<std::size_t>(id)];
+        // A segment that reaches over the repeat's edge began in the repeat before.
+        found.push_back({along_y.repeat - (y_[along_y.index] < segment.corner.y() ? 1 : 0),
+                         along_x.repeat - (x_[along_x.index] < segment.corner.x() ? 1 : 0), id});
+      }
+    }
+    std::sort(found.begin(), found.end());
+    found.erase(std::unique(found.begin(), found.end()), found.end());
+    for (const auto& [j, i, id] : found) visit_float(j, i, floats_[static_cast<std::size_t>(id)]);
+    return;
+  }
   for (std::int64_t j = repeat_of(rectangle.min.y() - largest_.y(), 1);
        j <= repeat_of(rectangle.max.y(), 1); ++j) {
     for (std::int64_t i = repeat_of(rectangle.min.x() - largest_.x(), 0);
          i <= repeat_of(rectangle.max.x(), 0); ++i) {
-      const Vec2d origin(static_cast<double>(i) * repeat_.x(),
-                         static_cast<double>(j) * repeat_.y());
-      for (const WovenFloat& segment : floats_) {
-        const Vec2d corner = origin + segment.corner;
-        const Rectangle clip = {(rectangle.min - corner).cwiseMax(0.0),
-                                (rectangle.max - corner).cwiseMin(segment.size)};
-        if ((clip.min.array() >= clip.max.array()).any()) continue;
-        visitor({&segment, i, j, corner}, clip);
-      }
+      for (const WovenFloat& segment : floats_) visit_float(j, i, segment);
     }
   }
 }
@@ -205,23 +245,16 @@ void WovenPattern::visit_footprint(const Vec2d& position, double footprint,
 }
 
 WovenPattern read_woven_pattern(const TomlTable& section) {
-  const bool has_matrix = section.has("matrix");
-  const char* key = has_matrix ? "matrix" : "notation";
+  const Weave weave = read_weave(section);
+  const std::vector<double> end_widths = read_widths(section, "end_widths", weave.ends);
+  const std::vector<double> pick_widths = read_widths(section, "pick_widths", weave.picks);
   try {
-    Weave weave;
-    if (has_matrix) {
-      weave = parse_matrix(section.string("matrix"));
-    } else {
-      const std::string notation = section.string("notation");
-      const bool satin = notation.starts_with("satin");
-      const bool weft = satin && section.choice("face", {"warp", "weft"}) == "weft";
-      weave = parse_weave(notation, weft ? WeaveFace::kWeft : WeaveFace::kWarp);
-    }
-    const std::vector<double> end_widths = read_widths(section, "end_widths", weave.ends);
-    const std::vector<double> pick_widths = read_widths(section, "pick_widths", weave.picks);
     return {weave, end_widths, pick_widths};
   } catch (const std::invalid_argument& error) {
-    section.fail(key, error.what());
+    for (const char* key : {"matrix", "draft", "picture"}) {
+      if (section.has(key)) section.fail(key, error.what());
+    }
+    section.fail("notation", error.what());
   }
 }
 

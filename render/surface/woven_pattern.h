@@ -93,8 +93,8 @@ class WovenPattern {
   std::vector<FloatKind> kinds_;
 };
 
-/// The section [weave] of a woven surface: `notation` and `face` as in fabrics, or `matrix`, and
-/// the widths. Errors: ConfigError.
+/// The section [weave] of a woven surface: the weave as in fabrics (fibers/cloth/weave_config.h),
+/// and the widths. Errors: ConfigError; FileError of a draft or a picture.
 WovenPattern read_woven_pattern(const TomlTable& section);
 
 /// A colour of a yarn: three numbers from 0 to `max`.

@@ -397,6 +397,24 @@ TEST_F(ImageFileFormat, FailedWritesNameTheTarget) {
   EXPECT_EQ(file_count(), 0u);
 }
 
+TEST_F(ImageFileFormat, PngPixelsComeBack) {
+  std::vector<std::uint8_t> rgb;
+  for (int k = 0; k < 3 * 5 * 7; ++k) rgb.push_back(static_cast<std::uint8_t>(37 * k));
+  write_png(folder_ / "p.png", 5, 7, rgb);
+  const RgbPicture picture = read_png(folder_ / "p.png", 7);
+  EXPECT_EQ(picture.width, 5);
+  EXPECT_EQ(picture.height, 7);
+  EXPECT_EQ(picture.rgb, rgb);
+  EXPECT_NE(
+      error_of([&] { read_png(folder_ / "p.png", 6); }).find("5 x 7 pixels; expected at most"),
+      std::string::npos);
+  const std::string bytes = bytes_of(folder_ / "p.png");
+  for (std::size_t size = 0; size < bytes.size() - 12; ++size) {
+    EXPECT_NE(error_of([&] { read_png(put("cut.png", bytes.substr(0, size)), 7); }), "no error")
+        << size;
+  }
+}
+
 TEST_F(ImageFileFormat, PngRoundTripAndEqualBytes) {
   const int width = 7;
   const int height = 5;

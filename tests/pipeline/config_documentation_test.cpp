@@ -11,6 +11,8 @@
 #include <string>
 
 #include "fibers/cloth/fabric_config.h"
+#include "fibers/cloth/weave_config.h"
+#include "formats/image_file.h"
 #include "formats/toml_table.h"
 #include "precompute/transfer_bake.h"
 #include "precompute/visibility_settings.h"
@@ -18,6 +20,7 @@
 #include "render/scene_config.h"
 #include "render/surface/surface_model.h"
 #include "render/surface/surface_presets.h"
+#include "tests/support/temporary_folder.h"
 
 namespace heddle {
 namespace {
@@ -73,6 +76,91 @@ void expect_equal(const Keys& asked, const Keys& documented) {
     EXPECT_TRUE(asked.contains(key)) << key << " is documented, and nobody asks for it";
 }
 
+// Those of [weave] that say how warp and weft cross have a section of their own.
+void remove_weave_keys(Keys& asked) {
+  for (const auto& [key, properties] : documented("Weaves")) asked.erase(key);
+}
+
+TEST(ConfigDocumentation, NamesEveryKeyOfAWeave) {
+  TemporaryFolder folder;
+  std::ofstream(folder.path() / "d.wif")
+      << "[WIF]\n[WEAVING]\nShafts=1\nTreadles=1\nRising Shed=yes\n[WARP]\nThreads=1\n[WEFT]\n"
+         "Threads=1\n[THREADING]\n1=1\n[LIFTPLAN]\n1=1\n";
+  write_png(folder.path() / "p.png", 1, 1, {0, 0, 0});
+  Keys asked;
+  for (const char* keys :
+       {"notation = \"satin 5/2\"\nface = \"warp\"", "notation = \"pointed 2/2\"\nwidth = 4",
+        "matrix = \"1\"", "draft = \"d.wif\"", "picture = \"p.png\""}) {
+    const TomlTable document =
+        TomlTable::parse(std::string("[weave]\n") + keys, (folder.path() / "fabric.toml").string());
+    read_weave(document.table("weave"));
+    add(document, asked);
+  }
+  asked.erase("weave");
+  expect_equal(asked, documented("Weaves"));
+}
+
+// Those of a yarn too, wherever it stands.
+void remove_yarn_keys(Keys& asked) {
+  for (const auto& [key, properties] : documented("Yarns")) {
+    for (const char* place : {"yarn.NAME.", "warp.", "weft.", "knit.", "curves."})
+      asked.erase(place + key);
+  }
+}
+
+TEST(ConfigDocumentation, NamesEveryKeyOfAYarn) {
+  const std::string way =
+      "yarn_twist_per_m = 0\nply_twist_per_m = 0\nmigration = 0\nwander_rms_deg = 0\n"
+      "density = { epsilon = 0, beta = 1 }\n"
+      "hairs = { per_m = 0, start_mm = [0, 0], rise_mm = [1, 0], along_mm = [0, 0], "
+      "around_deg = [0, 0] }\nloops = { per_m = 0, height_mm = [0, 0] }\n"
+      "slubs = [{ per_m = 0, length_mm = [1, 0], thickness = [1, 0] }]\n"
+      "neps = { per_m = 0, diameter_mm = [1, 0], fibers = 1 }\n";
+  Keys asked;
+  for (const std::string& size :
+       {std::string("plies = 1\nfibers_per_ply = 9\nwidth_mm = 1\nheight_mm = 1\n"),
+        std::string("plies = 1\ncolor = \"#204060\"\ncount = \"2 tex\"\n"),
+        "from = \"" + (kConfigs / "yarns" / "cotton1.toml").string() + "\"\n"}) {
+    const TomlTable document = TomlTable::parse(
+        "[fiber.f]\nradius_um = 5\ndensity_g_cm3 = 1.5\n"
+        "scattering = \"white-isotropic\"\n[yarn]\nfiber = \"f\"\n" +
+            size + (size.starts_with("from") ? "" : way),
+        "fabric.toml");
+    std::vector<FiberType> fibers = {read_fiber(document.table("fiber").table("f"), "f")};
+    read_yarn(document.table("yarn"), "yarn", fibers);
+    add(document, asked);
+  }
+  Keys of_yarn;
+  for (const auto& [key, properties] : asked) {
+    if (key.starts_with("yarn.")) of_yarn[key.substr(5)] = properties;
+  }
+  expect_equal(of_yarn, documented("Yarns"));
+}
+
+TEST(ConfigDocumentation, NamesEveryKeyOfFoundCurves) {
+  TemporaryFolder folder;
+  std::ofstream(folder.path() / "c.obj") << "v 0 0 0\nv 1 0 0\nl 1 2\n";
+  Keys asked;
+  for (const char* what : {"as = \"yarns\"\nyarn = \"y\"", "as = \"yarns\"\nsequence = [\"y\"]",
+                           "as = \"fibers\"\nfiber = \"f\""}) {
+    const TomlTable document = TomlTable::parse(
+        "name = \"n\"\nsegment_um = 100\n[fiber.f]\nradius_um = 5\n"
+        "scattering = \"white-isotropic\"\n[yarn.y]\nfiber = \"f\"\nfrom = \"" +
+            (kConfigs / "yarns" / "cotton1.toml").string() +
+            "\"\n[curves]\nfile = \"c.obj\"\nunit_mm = 1\nnormal = \"z\"\nfrom_mm = [0, 0]\n"
+            "size_mm = [1, 1]\n" +
+            what,
+        (folder.path() / "fabric.toml").string());
+    read_fabric_config(document);
+    add(document, asked);
+  }
+  Keys of_curves;
+  for (const auto& [key, properties] : asked) {
+    if (key.starts_with("curves.")) of_curves[key] = properties;
+  }
+  expect_equal(of_curves, documented("Found curves"));
+}
+
 TEST(ConfigDocumentation, NamesEveryKeyOfAFabric) {
   Keys asked;
   for (const fs::path& file : files_in("fabrics")) {
@@ -85,6 +173,8 @@ TEST(ConfigDocumentation, NamesEveryKeyOfAFabric) {
     document.finish();
     add(document, asked);
   }
+  remove_weave_keys(asked);
+  remove_yarn_keys(asked);
   expect_equal(asked, documented("Fabrics"));
 }
 
@@ -117,6 +207,7 @@ TEST(ConfigDocumentation, NamesEveryKeyOfASurfaceFabric) {
       read_surface_model(document);
       add(document, asked);
     }
+    remove_weave_keys(asked);
     expect_equal(asked, documented(model.section));
   }
 }

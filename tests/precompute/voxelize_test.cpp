@@ -123,6 +123,32 @@ TEST(VoxelizeLaw, FilledShareIsTheVolumeOfTheFiber) {
   EXPECT_NEAR(filled / static_cast<double>(volume.ids.size()) / expected, 1, 0.105);
 }
 
+/// A hair across the tile's corner: an open fiber of four segments.
+TEST(VoxelizeLaw, AnOpenFiberEndsRoundInEveryCopy) {
+  Exemplar exemplar;
+  exemplar.width_mm = 0.31F;
+  exemplar.height_mm = 0.23F;
+  exemplar.first_point = {0, 4};
+  exemplar.points = {Vec3(0.25F, 0.2F, 0), Vec3(0.3F, 0.22F, 0.02F), Vec3(0.35F, 0.25F, 0.03F),
+                     Vec3(0.4F, 0.26F, 0.03F)};
+  exemplar.radius_mm = {0.02F};
+  exemplar.material = {0};
+  exemplar.is_open = {1};
+  exemplar.scattering.resize(1);
+  index_segments(exemplar);
+  EXPECT_NO_THROW(validate_exemplar(exemplar, "hair"));
+  const IdVolume volume = voxelize(exemplar, {4});
+  double filled = 0;
+  for (const std::int32_t id : volume.ids) filled += id >= 0;
+  double length = 0;
+  for (std::size_t k = 0; k < 3; ++k)
+    length += static_cast<double>((exemplar.points[k + 1] - exemplar.points[k]).norm());
+  const double expected = kPi * 0.02 * 0.02 * (length + 4.0 / 3 * 0.02);
+  const double voxel = volume.voxel_mm[0] * volume.voxel_mm[1] * volume.voxel_mm[2];
+  // A sphere or cylinder of 4 voxels radius, off by a few percent; bends count twice or not.
+  EXPECT_NEAR(filled * voxel / expected, 1, 0.04);
+}
+
 TEST(VoxelizeStatistical, RaysThroughTheVolumeSeeWhatRaysAgainstFibersSee) {
   const TileScene scene(crossed_layers(test_cotton()));
   const Exemplar& exemplar = scene.exemplar();

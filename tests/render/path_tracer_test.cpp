@@ -6,8 +6,10 @@
 #include <cmath>
 #include <memory>
 
+#include "fibers/cloth/synthesize.h"
 #include "fibers/math/quadrature.h"
 #include "fibers/math/spherical_gaussian.h"
+#include "tests/support/fabrics.h"
 #include "tests/support/fibers.h"
 #include "tests/support/pictures.h"
 #include "tests/support/small_exemplars.h"
@@ -107,6 +109,36 @@ TEST(PathTracerLaw, Furnace) {
           means.total[0].mean(), means.total[0].standard_error(), 1, 0, 4));
     }
     EXPECT_EQ(world.scene->failed_walks(), 0U);
+  }
+}
+
+// The same in cloth with hairs and in a knit, from both kinds of estimator. Rays that pass the
+// cloth see the light behind it, which is as bright.
+TEST(PathTracerLaw, FurnaceOfHairsAndKnits) {
+  const std::vector<Light> light = {
+      test::sg_light({0, 0, 1}, 0, Rgb(1, 1, 1) * static_cast<float>(4 * kPi))};
+  for (const FabricConfig& config : {test::small_hairy_fabric(), test::small_knit()}) {
+    Exemplar exemplar = synthesize(config);
+    exemplar.scattering.assign(exemplar.scattering.size(), test::white_fiber());
+    const World world = make_world(std::move(exemplar), {curved_patch()}, light);
+    const Means escapes = measure(world.tracer(LightEstimator::kEscapes), 1000, 1);
+    EXPECT_NEAR(escapes.total[0].mean(), 1, 1e-4);
+    const Means means = measure(world.tracer(LightEstimator::kCombined), 10000, 2);
+    EXPECT_TRUE(
+        means_agree("furnace", means.total[0].mean(), means.total[0].standard_error(), 1, 0, 2));
+    EXPECT_EQ(world.scene->failed_walks(), 0U);
+  }
+}
+
+TEST(PathTracerStatistical, EstimatorsAgreeInHairsAndKnits) {
+  for (const FabricConfig& config : {test::small_hairy_fabric(), test::small_knit()}) {
+    const World world = make_world(synthesize(config), {curved_patch()},
+                                   {test::sg_light({-0.4F, 0.3F, 1}, 30, Rgb(3, 3, 3))});
+    const Means shadow = measure(world.tracer(LightEstimator::kShadowRays), 20000, 4);
+    const Means escapes = measure(world.tracer(LightEstimator::kEscapes), 60000, 5);
+    EXPECT_TRUE(means_agree("shadow rays, escapes", shadow.total[0].mean(),
+                            shadow.total[0].standard_error(), escapes.total[0].mean(),
+                            escapes.total[0].standard_error(), 2));
   }
 }
 

@@ -35,6 +35,32 @@ inline FabricConfig small_fabric(const std::string& notation = "plain") {
   return config;
 }
 
+/// The same with flyaways on its yarns, 1.2 mm wide and high: hairs, which are open fibers, across
+/// every edge of the tile, and loops.
+inline FabricConfig small_hairy_fabric() {
+  FabricConfig config = small_fabric();
+  config.repeats_x = config.repeats_y = 2;
+  for (YarnConfig& yarn : config.yarns) {
+    yarn.hairs = {4, {0.05, 0.005}, {0.1, 0.03}, {0, 0.1}, {0, 0.5}};
+    yarn.loops = {1, {0.1, 0.01}};
+  }
+  return config;
+}
+
+/// A jersey of three courses and two wales, 1 mm wide and 1.2 mm high.
+inline FabricConfig small_knit() {
+  FabricConfig config = small_fabric();
+  config.knit = KnitConfig{KnitStructure::kJersey, 2, 2.5, 2, 3, {0}};
+  config.yarns[0].width_mm = config.yarns[0].height_mm = 0.11;
+  config.yarns[0].fibers_per_ply = 3;
+  return config;
+}
+
+/// One of each kind whose geometry is special.
+inline std::vector<FabricConfig> kinds_of_cloth() {
+  return {small_fabric(), small_hairy_fabric(), small_knit()};
+}
+
 /// Straight periodic fibers along x at the given (y, z), `segments` pieces each, on a width x
 /// height tile.
 inline Exemplar straight_fibers(float width, float height, const std::vector<Vec2>& places,
