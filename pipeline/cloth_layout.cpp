@@ -29,6 +29,10 @@ std::optional<BlockLayout> block_layout(const ClothConfig& cloth,
   layout.order = cloth.blocks->order;
   layout.seed = cloth.blocks->seed;
   for (const FabricConfig* fabric : fabrics) {
+    if (fabric->knit || fabric->curves) {
+      throw ConfigError(fmt::format("{}: blocks are repeats of a weave, and {} is not woven", scene,
+                                    fabric->name));
+    }
     if (fabric->repeats_x % size[0] != 0 || fabric->repeats_y % size[1] != 0) {
       throw ConfigError(fmt::format(
           "{}: blocks of {} x {} repeats do not divide the tile of {}, which has {} x {}", scene,

@@ -61,6 +61,14 @@ TEST(ClothLayout, TheCornerMovesThePicture) {
   }
 }
 
+TEST(ClothLayout, BlocksNeedAWeave) {
+  const FabricConfig woven = test::small_fabric();
+  FabricConfig knit = woven;
+  knit.knit.emplace();
+  EXPECT_EQ(message(patterned(), woven, knit),
+            "scene.toml: blocks are repeats of a weave, and small is not woven");
+}
+
 TEST(ClothLayout, UnequalBlocksAreNamedWithTheirNumbers) {
   const FabricConfig plain = test::small_fabric();
   const FabricConfig satin = test::small_fabric("satin 5/2");

@@ -186,8 +186,8 @@ TEST_F(SceneConfigTest, MistakesAreLocated) {
       {"fabric = \"silk.toml\"", "fabric = \"silk.toml\"\nsurface_method = \"interactive\"",
        "surface_method"},
       {"fabric = \"silk.toml\"", "fabric = \"silk.toml\"\nsurface = \"velvet\"",
-       "either fabric or surface"},
-      {"fabric = \"silk.toml\"\n", "", "either fabric or surface"},
+       "one of fabric, surface and pattern"},
+      {"fabric = \"silk.toml\"\n", "", "one of fabric, surface and pattern"},
       {"spp = 64", "spp = 63", "even"},
       {"name = \"test\"", "name = \"test\"\nnmae = 3", "nmae"},
   };
