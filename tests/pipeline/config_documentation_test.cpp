@@ -173,6 +173,28 @@ TEST(ConfigDocumentation, NamesEveryKeyOfAFabric) {
     document.finish();
     add(document, asked);
   }
+  // What none of them holds.
+  TemporaryFolder folder;
+  std::ofstream(folder.path() / "d.wif")
+      << "[WIF]\n[WEAVING]\nShafts=1\nTreadles=1\nRising Shed=yes\n[WARP]\nThreads=1\nColor=1\n"
+         "[WEFT]\nThreads=1\nColor=1\n[COLOR PALETTE]\nEntries=1\nRange=0,255\n[COLOR TABLE]\n"
+         "1=9,9,9\n[THREADING]\n1=1\n[LIFTPLAN]\n1=1\n";
+  const std::string yarn = "[yarn.y]\nfiber = \"f\"\nfrom = \"" +
+                           (kConfigs / "yarns" / "cotton1.toml").string() + "\"\n";
+  for (const char* cloth :
+       {"[weave]\ndraft = \"d.wif\"\nrepeats_x = 1\nrepeats_y = 1\n[warp]\nspacing_mm = 1\n"
+        "sequence = [\"y\"]\ncolors = \"draft\"\n[weft]\nspacing_mm = 1\nsequence = [\"y\"]\n"
+        "colors = \"draft\"\n",
+        "[knit]\nstructure = \"jersey\"\nwales_per_cm = 5\ncourses_per_cm = 7\nwales = 1\n"
+        "courses = 2\nsequence = [\"y\"]\n"}) {
+    const TomlTable document = TomlTable::parse(
+        "name = \"n\"\nsegment_um = 100\n[fiber.f]\nradius_um = 5\ncolor_r = [0, 0, 0]\n"
+        "color_tt = [0, 0, 0]\nbeta_r_deg = 5\nbeta_tt_deg = 5\ngamma_tt_deg = 9\n" +
+            yarn + cloth,
+        (folder.path() / "fabric.toml").string());
+    read_fabric_config(document);
+    add(document, asked);
+  }
   remove_weave_keys(asked);
   remove_yarn_keys(asked);
   expect_equal(asked, documented("Fabrics"));
