@@ -19,8 +19,8 @@
 #include "formats/tensor_file.h"
 #include "pipeline/accuracy/accuracy_table.h"
 #include "pipeline/commands.h"
-#include "pipeline/fabric_report.h"
 #include "pipeline/draft_report.h"
+#include "pipeline/fabric_report.h"
 #include "pipeline/json_file.h"
 #include "pipeline/stages.h"
 #include "render/scene_config.h"
@@ -303,7 +303,7 @@ Report describe(const fs::path& path, const CommonOptions& common) {
   if (ending == ".toml") {
     const TomlTable document = TomlTable::load(path);
     if (document.has("model")) return describe_surface_fabric(document);
-    return document.has("weave") ? fabric_report(read_fabric_document(path, common.fabric_seed))
+    return document.has("fiber") ? fabric_report(read_fabric_document(path, common.fabric_seed))
                                  : describe_scene(document);
   }
   if (ending == ".safetensors") return describe_tensors(path, common);

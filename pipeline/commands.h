@@ -33,6 +33,7 @@ struct StageOptions {
   std::optional<int> order;
   std::optional<Shard> shard;                    // visibility and transfer
   std::optional<std::filesystem::path> preview;  // synth: a picture of the tile
+  bool dry_run = false;                          // precompute: only say what it would take
   std::optional<std::filesystem::path> output;   // pack: a copy outside the cache
 };
 /// Prints the path of the artifact.

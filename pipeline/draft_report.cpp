@@ -9,6 +9,7 @@
 
 #include "fibers/cloth/weave_config.h"
 #include "fibers/cloth/weave_report.h"
+#include "pipeline/fabric_report.h"
 
 namespace heddle {
 namespace {
@@ -23,13 +24,9 @@ constexpr int kDrawnShafts = 40;
 constexpr std::size_t kListedColors = 12;
 constexpr std::size_t kListedThreads = 8;
 
-double four_digits(double value) {
-  return std::stod(fmt::format("{:.4g}", value));
-}
-
 void add_floats(const char* name, const FloatLengths& floats, Report& report) {
   report[fmt::format("float.{}.longest", name)] = floats.longest;
-  report[fmt::format("float.{}.mean", name)] = four_digits(floats.mean);
+  report[fmt::format("float.{}.mean", name)] = rounded(floats.mean);
   if (floats.endless > 0) report[fmt::format("float.{}.endless_yarns", name)] = floats.endless;
 }
 
@@ -159,23 +156,21 @@ void describe_weave(const Weave& weave, Report& report) {
   report["ends"] = weave.ends;
   report["picks"] = weave.picks;
   report["smallest_repeat"] = fmt::format("{} x {}", facts.repeat_ends, facts.repeat_picks);
-  report["warp_on_face"] = four_digits(facts.warp_share);
+  report["warp_on_face"] = rounded(facts.warp_share);
   add_floats("warp_face", facts.warp_face, report);
   add_floats("warp_back", facts.warp_back, report);
   add_floats("weft_face", facts.weft_face, report);
   add_floats("weft_back", facts.weft_back, report);
-  report["interlacing.warp"] = four_digits(facts.warp_interlacing);
-  report["interlacing.weft"] = four_digits(facts.weft_interlacing);
+  report["interlacing.warp"] = rounded(facts.warp_interlacing);
+  report["interlacing.weft"] = rounded(facts.weft_interlacing);
   report["layers"] = facts.layers.size();
-  if (const auto density = threads_per_cm(weave.warp))
-    report["ends_per_cm"] = four_digits(*density);
-  if (const auto density = threads_per_cm(weave.weft))
-    report["picks_per_cm"] = four_digits(*density);
+  if (const auto density = threads_per_cm(weave.warp)) report["ends_per_cm"] = rounded(*density);
+  if (const auto density = threads_per_cm(weave.weft)) report["picks_per_cm"] = rounded(*density);
   const std::optional<double> warp = cover_of(weave.warp);
   const std::optional<double> weft = cover_of(weave.weft);
-  if (warp) report["cover.warp"] = four_digits(*warp);
-  if (weft) report["cover.weft"] = four_digits(*weft);
-  if (warp && weft) report["cover.cloth"] = four_digits(*warp + *weft - *warp * *weft);
+  if (warp) report["cover.warp"] = rounded(*warp);
+  if (weft) report["cover.weft"] = rounded(*weft);
+  if (warp && weft) report["cover.cloth"] = rounded(*warp + *weft - *warp * *weft);
   if (!weave.warp.color.empty()) report["colors.warp"] = color_counts(weave.warp);
   if (!weave.weft.color.empty()) report["colors.weft"] = color_counts(weave.weft);
   report["drawing"] = draw_weave(weave);

@@ -139,7 +139,11 @@ Report fabric_report(const FabricDocument& fabric) {
     } else if (config.curves) {
       describe_curves(*config.curves, config, report);
     } else {
-      describe_weave(config.weave, report);
+      report["weave"] = config.weave.notation;
+      Weave crossings = config.weave;
+      // What a draft says of its threads is not what the config makes of them.
+      crossings.warp = crossings.weft = {};
+      describe_weave(crossings, report);
       describe_threads(config, lay_yarns(config), report);
     }
     for (const YarnConfig& yarn : config.yarns)

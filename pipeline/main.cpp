@@ -124,6 +124,8 @@ void add_stage_command(CLI::App& app, Options& options, const std::string& name,
   if (target == StageTarget::kPack) {
     command->add_option("-o,--output,--outfile", options.stage.output,
                         "Folder for a copy of the pack outside the cache");
+    command->add_flag("--dry-run", options.stage.dry_run,
+                      "Only say what is missing, and what memory and time it would take");
   }
   if (target == StageTarget::kSynth) {
     command->add_option("--preview", options.stage.preview,

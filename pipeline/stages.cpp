@@ -32,6 +32,8 @@ namespace fs = std::filesystem;
 // little is lost when a job is killed, and enough work for many threads.
 constexpr std::uint32_t kSegmentsPerChunk = 256;
 constexpr std::uint32_t kCellsPerChunk = 32;
+// So many items of a stage are timed for a forecast.
+constexpr std::uint32_t kForecastProbes = 24;
 
 // Of every stage, and of the hash of the fibers' shapes. One whose algorithm or file layout changes
 // needs a new number: its key holds it, and what the old one made is then found no more.
@@ -728,6 +730,57 @@ double FabricStages::transfer_order_ratio(int order) {
     return watch.elapsed().seconds;
   };
   return seconds_to(order) / seconds_to({});
+}
+
+std::vector<StageForecast> FabricStages::forecast(std::optional<int> order) {
+  const auto is_present = [this](const Stage& stage) {
+    return fs::exists(context_->cache.artifact(stage.name, stage.key, stage.extension));
+  };
+  const auto time_of = [](std::uint32_t items, const auto& work) {
+    const std::uint32_t probes = std::min(items, kForecastProbes);
+    const Stopwatch watch;
+    for (std::uint32_t k = 0; k < probes; ++k) {
+      const auto item = static_cast<std::uint32_t>((static_cast<std::uint64_t>(2 * k + 1) * items) /
+                                                   (2 * probes));
+      work(item, item + 1);
+    }
+    return watch.elapsed().core_seconds / probes * items;
+  };
+  std::vector<StageForecast> forecasts;
+  const ExemplarForecast fibers = forecast_exemplar(document_.config);
+  forecasts.push_back({.stage = "synth",
+                       .present = is_present(synth_stage()),
+                       .items = fibers.segments,
+                       .unit = "segments",
+                       .bytes = fibers.bytes});
+  const auto segments = static_cast<std::uint32_t>(exemplar().segment_count());
+  const bool both_sides = document_.config.light_from_both_sides;
+  StageForecast maps{
+      .stage = "maps",
+      .present = is_present(maps_stage()) || (is_present(ssdf_stage()) && is_present(sg_stage())),
+      .items = static_cast<double>(segments),
+      .unit = "segments",
+      .bytes = 3.0 * (both_sides ? 2048 : 1024) * segments};
+  if (!maps.present) {
+    maps.core_seconds = time_of(segments, [&](std::uint32_t first, std::uint32_t end) {
+      bake_visibility_maps(scene(), origins(), both_sides, first, end);
+    });
+  }
+  forecasts.push_back(maps);
+  const TransferSettings settings = transfer_settings(order);
+  StageForecast transfer{
+      .stage = "transfer", .present = is_present(transfer_stage(settings)), .unit = "cells"};
+  if (!transfer.present) {
+    const auto work = transfer_work(settings);
+    const double bands = (settings.order + 1) * (settings.order + 1);
+    const std::uint32_t cells = work->baker->cell_count();
+    transfer.items = cells;
+    transfer.bytes = 3 * 3 * sizeof(float) * bands * bands * cells;
+    transfer.core_seconds = time_of(
+        cells, [&](std::uint32_t first, std::uint32_t end) { work->baker->bake(first, end); });
+  }
+  forecasts.push_back(transfer);
+  return forecasts;
 }
 
 void FabricStages::transfer_shard(std::optional<int> order, Shard shard) {

@@ -107,6 +107,16 @@ struct StageCost {
   bool present = false;  // the artifact is in the cache
 };
 
+/// What building an artifact is expected to take.
+struct StageForecast {
+  std::string stage;
+  bool present = false;  // in the cache; then nothing else is told
+  double items = 0;
+  std::string unit;
+  double bytes = 0;         // of memory, at the peak of the stage
+  double core_seconds = 0;  // processor time; 0 where it is not told
+};
+
 /// A fabric file, read and checked.
 struct FabricDocument {
   std::filesystem::path file;
@@ -191,6 +201,10 @@ class FabricStages {
   /// What the stages behind pack(needs) took when they were built, by whatever process; seconds < 0
   /// where an artifact came without its record, or is not there. Builds the fibers only.
   std::vector<StageCost> costs(const Needs& needs);
+
+  /// What a pack of everything would take. Builds the fibers, and times the long stages on a few of
+  /// their items, spread over all; fits to maps are not told.
+  std::vector<StageForecast> forecast(std::optional<int> order);
 
   /// Computes this shard's chunks and leaves them in the cache; a later run of the stage finds
   /// them.

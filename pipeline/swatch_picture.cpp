@@ -19,15 +19,10 @@ constexpr double kDistance = 400;  // mm; as good as parallel for swatches of so
 constexpr double kSizeOfPicture = 1.6;
 constexpr double kMarginMm = 4;
 
-Light directional(const Vec3& axis, float irradiance) {
+Light soft(const Vec3& axis, float sharpness, float irradiance) {
   Light light;
   light.axis = axis.normalized();
   light.irradiance = Rgb::Constant(irradiance);
-  return light;
-}
-
-Light soft(const Vec3& axis, float sharpness, float irradiance) {
-  Light light = directional(axis, irradiance);
   light.type = LightType::kSphericalGaussian;
   light.sharpness = sharpness;
   return light;
@@ -35,7 +30,7 @@ Light soft(const Vec3& axis, float sharpness, float irradiance) {
 
 /// A white surface under these shows about 0.8.
 std::vector<Light> lights_of_swatch(bool both_sides) {
-  std::vector<Light> lights = {directional(Vec3(0.6F, 0.3F, 1), 2.1F),
+  std::vector<Light> lights = {soft(Vec3(0.6F, 0.3F, 1), 60, 2.1F),
                                soft(Vec3(-0.5F, 0.4F, 1), 6, 1.1F)};
   if (both_sides) lights.push_back(soft(Vec3(0.1F, 0.4F, -1), 3, 2.0F));
   return lights;
@@ -63,7 +58,8 @@ std::vector<Rgb> trace_swatch(const std::shared_ptr<const TileScene>& tile, bool
   settings.seed = seed;
   const PathTracer tracer(scene, materials, lights, Rgb::Constant(both_sides ? 0.6F : 0.0F),
                           settings);
-  return trace_picture(tracer, camera, camera.full_frame(), seed, SampleBudget{.spp = view.spp, .seconds = {}}, progress)
+  return trace_picture(tracer, camera, camera.full_frame(), seed,
+                       SampleBudget{.spp = view.spp, .seconds = {}}, progress)
       .beauty;
 }
 

@@ -17,6 +17,7 @@
 
 #include "fibers/math/vector.h"
 #include "fibers/scattering/bcsdf_table.h"
+#include "fibers/cloth/weave.h"
 #include "fibers/tracing/cloth_tiling.h"
 
 namespace heddle {
@@ -26,9 +27,6 @@ struct YarnTintConfig {
   double correlation_yarns = 0;  // yarns at which the correlation has fallen to 0.61; 0: none
   std::uint64_t seed = 1;
 };
-
-/// Ends and picks.
-enum class YarnSystem : std::uint8_t { kWarp, kWeft };
 
 /// The factor of one yarn of the cloth. Within 3 rms of 1, and not negative.
 double yarn_tint(const YarnTintConfig& config, YarnSystem system, std::int64_t number);

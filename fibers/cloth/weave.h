@@ -17,6 +17,8 @@ namespace heddle {
 /// Ends, and picks, of the largest weave.
 inline constexpr int kMaxWeaveExtent = 4096;
 
+/// Ends and picks.
+enum class YarnSystem : std::uint8_t { kWarp, kWeft };
 enum class WeaveFace : std::uint8_t { kWarp, kWeft };
 enum class TwillDirection : std::uint8_t {
   kZ,

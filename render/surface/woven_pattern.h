@@ -18,8 +18,6 @@
 
 namespace heddle {
 
-enum class YarnSystem : std::uint8_t { kWarp, kWeft };
-
 /// One visible segment of the repeat.
 struct WovenFloat {
   YarnSystem system;

@@ -37,7 +37,8 @@ TEST(TransferBakeStatistical, FurnaceBalancesVisibility) {
     const TileScene scene(exemplar);
     const std::vector<BcsdfTable> materials = {BcsdfTable(test::white_fiber())};
     const SegmentOrigins origins = find_segment_origins(scene, true, OriginChoice::kExposed, 1);
-    const SegmentCells cells = make_segment_cells(exemplar, origins, 0.3F);
+    const SegmentCells cells =
+        make_segment_cells(exemplar, origins, config.knit || config.repeats_x > 1 ? 0.4F : 0.2F);
     const TransferSettings settings = settings_of(2, 16384, true);
     const TransferBaker baker(scene, materials, origins, settings, cells);
     const std::vector<TransferChunk> chunks = {baker.bake(0, cells.count)};

@@ -134,7 +134,7 @@ TEST(VoxelizeLaw, AnOpenFiberEndsRoundInEveryCopy) {
   exemplar.radius_mm = {0.02F};
   exemplar.material = {0};
   exemplar.is_open = {1};
-  exemplar.scattering.resize(1);
+  exemplar.scattering = {test::white_fiber()};
   index_segments(exemplar);
   EXPECT_NO_THROW(validate_exemplar(exemplar, "hair"));
   const IdVolume volume = voxelize(exemplar, {4});

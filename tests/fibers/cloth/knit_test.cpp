@@ -5,6 +5,9 @@
 #include <cmath>
 #include <cstdio>
 #include <stdexcept>
+#include <string>
+
+#include "formats/input_error.h"
 
 namespace heddle {
 namespace {
@@ -111,6 +114,17 @@ TEST(KnitLaw, CoursesGoOnInTheNextTile) {
         1e-9);
     EXPECT_NEAR((last.side - first.side).norm() + (last.up - first.up).norm(), 0, 1e-9);
   }
+}
+
+TEST(Knit, ARibOfAnOddNumberOfWalesIsRefused) {
+  const auto read = [](const std::string& wales) {
+    return read_knit(TomlTable::parse(
+        "structure = \"rib 1x1\"\nwales_per_cm = 14\ncourses_per_cm = 18\ncourses = 4\nwales = " +
+            wales + "\n",
+        "fabric.toml"));
+  };
+  EXPECT_NEAR(read("4").width_mm(), 4 / 1.4, 1e-12);
+  EXPECT_THROW(read("3"), ConfigError);
 }
 
 TEST(Knit, YarnsTooThickAreRefusedWithWhatWouldFit) {
