@@ -105,9 +105,9 @@ class ClothScene {
   std::vector<FiberScattering> materials() const { return materials_; }
   bool has_tints(std::uint32_t part) const { return cloths_[parts_[part].cloth].tints.has_value(); }
   /// Factor of the scattering of the yarn at a hit; 1 where the cloth has no tints.
-  float tint(const ShellHit& hit) const {
+  Rgb tint(const ShellHit& hit) const {
     const Cloth& cloth = cloths_[hit.cloth];
-    if (!cloth.tints) return 1;
+    if (!cloth.tints) return Rgb::Ones();
     return cloth.tints->tint_at(cloth.tiling, hit.part - cloth.first_part, hit.segment, hit.fabric);
   }
 

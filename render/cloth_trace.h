@@ -21,7 +21,7 @@ class ClothTrace {
     ShellHit hit;
     Vec3 tangent;            // unit, world
     std::uint16_t material;  // index into ClothScene::materials()
-    float tint;              // of the yarn
+    Rgb tint;                // of the yarn
     bool is_end = false;
   };
 

@@ -178,10 +178,10 @@ void PrecomputedRenderer::tint_yarns(const GBuffer& g_buffer, std::span<EyeSampl
   for (const SeenFiber& fiber : g_buffer.fibers) {
     const std::optional<Rgb>& scatterings = own_scatterings_[fiber.hit.part];
     if (!scatterings) continue;
-    const float tint = scene_->tint(fiber.hit);
+    const Rgb tint = scene_->tint(fiber.hit);
     EyeSample& sample = seen[fiber.sample];
     sample.single *= tint;
-    for (int c = 0; c < 3; ++c) sample.multiple[c] *= std::pow(tint, (*scatterings)[c]);
+    for (int c = 0; c < 3; ++c) sample.multiple[c] *= std::pow(tint[c], (*scatterings)[c]);
   }
 }
 

@@ -271,7 +271,7 @@ YarnDriftConfig read_yarn_drift(const TomlTable& table) {
 
 YarnTintConfig read_yarn_tint(const TomlTable& table) {
   YarnTintConfig tint;
-  tint.rms = 0.01 * table.number("rms_percent", {0, 30});
+  tint.rms = 0.01 * table.number("rms_percent", {0, 100});
   tint.correlation_yarns = table.number("correlation_yarns", {0, 64}, 0.0);
   tint.seed = read_seed(table);
   return tint;

@@ -143,9 +143,9 @@ ClothMesh refined(ClothMesh mesh, double longest_mm) {
 
 ClothMesh with_yarn_drift(ClothMesh mesh, const YarnDriftConfig& config) {
   mesh = refined(std::move(mesh), config.across_mm / kEdgesPerWave);
-  require_memory(kShellBytesPerTriangle * mesh.triangles.size(),
-                 fmt::format("cloth of {} triangles that resolve yarn_drift",
-                             mesh.triangles.size()));
+  require_memory(
+      kShellBytesPerTriangle * mesh.triangles.size(),
+      fmt::format("cloth of {} triangles that resolve yarn_drift", mesh.triangles.size()));
   const YarnDrift drift(config);
   for (Eigen::Vector2d& fabric : mesh.fabric) fabric += drift.shift(fabric);
   return mesh;

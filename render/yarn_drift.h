@@ -2,9 +2,10 @@
 #define HEDDLE_RENDER_YARN_DRIFT_H_
 // Yarns that do not lie evenly: the fabric's plane is shifted a little within itself, so that the
 // distances between yarns and their directions change from place to place. Ends move across (x) by
-// a sum of plane waves that are short across and long along the warp; picks (y) the same way turned.
-// The shift is a function of fabric coordinates without a period, the same for every method: it is
-// put into the fabric coordinates of a mesh, whose triangles are first cut until they resolve it.
+// a sum of plane waves that are short across and long along the warp; picks (y) the same way
+// turned. The shift is a function of fabric coordinates without a period, the same for every
+// method: it is put into the fabric coordinates of a mesh, whose triangles are first cut until they
+// resolve it.
 //
 // A wave of length l and amplitude a changes distances by 2 pi a / l. All waves have the same share
 // of the asked rms; their lengths are spread evenly in their logarithm over two octaves from the

@@ -29,15 +29,15 @@ double draw(std::uint64_t seed, YarnSystem system, std::int64_t number) {
   return std::sqrt(3.0) * (2 * random.uniform_double() - 1);
 }
 
-/// The most light that a fiber scatters of what arrives, over colours, at normal incidence.
-double most_scattered(const FiberScattering& fiber) {
-  if (fiber.isotropic_white) return 1;
-  return (fiber.color_r + (1 - fiber.color_r) * fiber.color_tt).maxCoeff();
+/// What a fiber scatters of the light that arrives at normal incidence.
+Rgb scattered_by(const FiberScattering& fiber) {
+  if (fiber.isotropic_white) return Rgb::Ones();
+  return (fiber.color_r + (1 - fiber.color_r) * fiber.color_tt).cast<float>().max(1e-3F);
 }
 
 }  // namespace
 
-double yarn_tint(const YarnTintConfig& config, YarnSystem system, std::int64_t number) {
+double yarn_dye(const YarnTintConfig& config, YarnSystem system, std::int64_t number) {
   double value = draw(config.seed, system, number);
   if (config.correlation_yarns > 0) {
     double sum = 0;
@@ -56,8 +56,7 @@ double yarn_tint(const YarnTintConfig& config, YarnSystem system, std::int64_t n
 
 YarnTints::OfExemplar YarnTints::of(const Exemplar& exemplar) {
   OfExemplar result;
-  const std::uint32_t count =
-      1 + *std::max_element(exemplar.yarn.begin(), exemplar.yarn.end());
+  const std::uint32_t count = 1 + *std::max_element(exemplar.yarn.begin(), exemplar.yarn.end());
   result.yarns.resize(count);
   // Centres as angles about the tile, since yarns at its edge lie on both sides of it.
   std::vector<Eigen::Vector2d> sums(count, Eigen::Vector2d(0, 0));
@@ -73,8 +72,7 @@ YarnTints::OfExemplar YarnTints::of(const Exemplar& exemplar) {
         std::abs(period.x()) > std::abs(period.y()) ? YarnSystem::kWeft : YarnSystem::kWarp;
     const auto axis = static_cast<Eigen::Index>(index_of(yarn.system));
     for (std::uint32_t p = first; p < last; ++p) {
-      const double angle =
-          2 * kPi * static_cast<double>(exemplar.points[p][axis]) / sizes[axis];
+      const double angle = 2 * kPi * static_cast<double>(exemplar.points[p][axis]) / sizes[axis];
       sums[exemplar.yarn[f]] += Eigen::Vector2d(std::cos(angle), std::sin(angle));
     }
   }
@@ -91,7 +89,7 @@ YarnTints::OfExemplar YarnTints::of(const Exemplar& exemplar) {
   for (const std::uint32_t y : order)
     result.yarns[y].rank = result.count[index_of(result.yarns[y].system)]++;
   for (const FiberScattering& fiber : exemplar.scattering)
-    result.largest.push_back(static_cast<float>(1 / std::max(1e-3, most_scattered(fiber))));
+    result.scattered.push_back(scattered_by(fiber));
   return result;
 }
 
@@ -110,8 +108,8 @@ YarnTints::Yarn YarnTints::yarn_at(const ClothTiling& tiling, std::uint32_t exem
   const bool is_warp = yarn.system == YarnSystem::kWarp;
   const double size = static_cast<double>(is_warp ? fibers.width_mm : fibers.height_mm);
   // The copy of the yarn that is nearest, in tiles from that of the block.
-  const auto tiles = static_cast<std::int64_t>(
-      std::floor((in_tile[is_warp ? 0 : 1] - yarn.centre) / size + 0.5));
+  const auto tiles =
+      static_cast<std::int64_t>(std::floor((in_tile[is_warp ? 0 : 1] - yarn.centre) / size + 0.5));
   std::int64_t blocks = 1;
   if (const BlockLayout* layout = tiling.layout())
     blocks = layout->tile_blocks[exemplar][is_warp ? 0 : 1];
@@ -123,12 +121,12 @@ YarnTints::Yarn YarnTints::yarn_at(const ClothTiling& tiling, std::uint32_t exem
   return {yarn.system, before + yarn.rank};
 }
 
-float YarnTints::tint_at(const ClothTiling& tiling, std::uint32_t exemplar, std::uint32_t segment,
-                         const Vec3d& fabric) const {
+Rgb YarnTints::tint_at(const ClothTiling& tiling, std::uint32_t exemplar, std::uint32_t segment,
+                       const Vec3d& fabric) const {
   const Yarn yarn = yarn_at(tiling, exemplar, segment, fabric);
   const std::uint16_t material = tiling.tiles()[exemplar]->exemplar().segment_material(segment);
-  return std::min(exemplars_[exemplar].largest[material],
-                  static_cast<float>(yarn_tint(config_, yarn.system, yarn.number)));
+  const auto more = static_cast<float>(yarn_dye(config_, yarn.system, yarn.number) - 1);
+  return exemplars_[exemplar].scattered[material].pow(more);
 }
 
 Rgb own_yarn_scatterings(const TileScene& tile, std::span<const BcsdfTable> materials) {

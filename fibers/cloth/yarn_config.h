@@ -67,8 +67,8 @@ FiberType read_fiber(const TomlTable& table, const std::string& name);
 YarnConfig read_yarn(const TomlTable& table, const std::string& name,
                      std::vector<FiberType>& fibers);
 
-/// The fiber type `fiber`, dyed so that thick cloth of it shows about the colour (linear rgb) in even
-/// light; found among `fibers` or added to them. Deep layers of scatterers of albedo a reflect
+/// The fiber type `fiber`, dyed so that thick cloth of it shows about the colour (linear rgb) in
+/// even light; found among `fibers` or added to them. Deep layers of scatterers of albedo a reflect
 /// R = (1 - g) / (1 + g), g = sqrt(1 - a) (diffusive reflectance, Hapke 1981), so color_tt becomes
 /// 4 R / (1 + R)^2. The surface's own reflection, color_r, stays.
 int dyed_fiber(int fiber, const Rgbd& color, std::vector<FiberType>& fibers);

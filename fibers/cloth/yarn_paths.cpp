@@ -26,6 +26,8 @@ constexpr double kSectionAllowance = 1.01;
 constexpr double kBalance = 2e-3;
 constexpr int kMostRounds = 400;
 constexpr double kRelaxation = 0.7;
+// Yarns that must lie above and below one place by more than this share of their half height jam.
+constexpr double kLargestConflict = 0.05;
 // Sections are flattened by the forces that were found, and laid again, so many times.
 constexpr int kFlatteningRounds = 3;
 // Between flattened neighbours so much room is left, in half heights of the yarns that pass there.
@@ -62,6 +64,7 @@ struct System {
   std::vector<std::vector<double>> heights;   // [yarn][sample]
   std::vector<std::vector<double>> flatness;  // [yarn][crossing] height of the section, relative
   std::vector<std::vector<double>> force;     // [yarn][crossing] away from the yarn that it crosses
+  std::vector<double> conflict;               // [yarn] mm
 
   std::size_t count() const { return centre.size(); }
   double half_height(std::size_t yarn, std::size_t crossing) const {
@@ -71,6 +74,19 @@ struct System {
     return std::min(width[yarn] / flatness[yarn][crossing], widest[yarn]);
   }
 };
+
+/// Widens a floor (sign 1) or ceiling (-1) of a periodic line so that nothing steeper is needed to
+/// stay clear of it.
+void limit_slope(std::vector<double>& bound, double sign, double most_per_sample) {
+  const std::size_t n = bound.size();
+  const auto follow = [&](std::size_t from, std::size_t to) {
+    const double least = sign * bound[from] - most_per_sample;
+    if (sign * bound[to] < least) bound[to] = sign * least;
+  };
+  // Twice around, for what reaches over the seam.
+  for (std::size_t k = 0; k < 2 * n; ++k) follow(k % n, (k + 1) % n);
+  for (std::size_t k = 2 * n; k > 0; --k) follow(k % n, (k - 1) % n);
+}
 
 class Loom {
  public:
@@ -90,6 +106,7 @@ class Loom {
       own->flatness.assign(own->count(), std::vector<double>(other.count(), 1.0));
       own->force.assign(own->count(), std::vector<double>(other.count(), 0.0));
       own->heights.resize(own->count());
+      own->conflict.assign(own->count(), 0);
     }
     plane_.assign(warp_.count() * weft_.count(), 0);
   }
@@ -107,18 +124,16 @@ class Loom {
     }
   }
 
-  double steepest_slope() const {
-    double steepest = 0;
+  /// By how much some yarn is asked to lie above a place that it must lie below, relative to the
+  /// thinnest yarn's half height.
+  double conflict() const {
+    double largest = 0;
+    double thinnest = kNothing;
     for (const System* own : {&warp_, &weft_}) {
-      const double step = step_of(*own);
-      for (const std::vector<double>& heights : own->heights) {
-        for (std::size_t i = 0; i < heights.size(); ++i) {
-          const double rise = heights[(i + 1) % heights.size()] - heights[i];
-          steepest = std::max(steepest, std::abs(rise) / step);
-        }
-      }
+      largest = std::max(largest, *std::max_element(own->conflict.begin(), own->conflict.end()));
+      thinnest = std::min(thinnest, *std::min_element(own->height.begin(), own->height.end()));
     }
-    return steepest;
+    return largest / thinnest;
   }
 
   std::vector<std::shared_ptr<const YarnShape>> shapes(bool is_warp) const {
@@ -208,9 +223,13 @@ class Loom {
         }
       });
     }
-    // Where two sections meet, rounding must not close the way between them.
+    limit_slope(floor, 1, kSteepestSlope * step_of(own));
+    limit_slope(ceiling, -1, kSteepestSlope * step_of(own));
+    own.conflict[yarn] = 0;
     for (std::size_t i = 0; i < samples; ++i) {
-      if (floor[i] > ceiling[i]) floor[i] = ceiling[i] = 0.5 * (floor[i] + ceiling[i]);
+      if (!(floor[i] > ceiling[i])) continue;
+      own.conflict[yarn] = std::max(own.conflict[yarn], floor[i] - ceiling[i]);
+      floor[i] = ceiling[i] = 0.5 * (floor[i] + ceiling[i]);
     }
     std::vector<double>& heights = own.heights[yarn];
     heights = taut_string(floor, ceiling);
@@ -315,7 +334,7 @@ FabricConfig scaled(FabricConfig config, double spacing, double thickness) {
 bool is_jammed(const FabricConfig& config) {
   Loom loom(config);
   loom.lay();
-  return loom.steepest_slope() > kSteepestSlope;
+  return loom.conflict() > kLargestConflict;
 }
 
 /// The factor nearest to 1 between it and `limit` at which the yarns pass, to 1 %; nothing where
@@ -332,12 +351,10 @@ std::optional<double> cure(double limit, Config&& config) {
   return good;
 }
 
-[[noreturn]] void fail_jammed(const FabricConfig& config, double slope) {
+[[noreturn]] void fail_jammed(const FabricConfig& config) {
   std::string message = fmt::format(
-      "the yarns jam: one would have to climb at {:.0f} degrees between its crossings, at most "
-      "{:.0f} "
-      "are possible",
-      degrees(std::atan(slope)), degrees(std::atan(kSteepestSlope)));
+      "the yarns jam: they would have to climb at more than {:.0f} degrees between their crossings",
+      degrees(std::atan(kSteepestSlope)));
   const auto wider = cure(4, [&](double factor) { return scaled(config, factor, 1); });
   const auto thinner = cure(0.05, [&](double factor) { return scaled(config, 1, factor); });
   if (wider)
@@ -425,8 +442,7 @@ YarnPaths lay_yarns(const FabricConfig& config) {
   }
   Loom loom(config);
   loom.lay();
-  if (const double slope = loom.steepest_slope(); slope > kSteepestSlope)
-    fail_jammed(config, slope);
+  if (loom.conflict() > kLargestConflict) fail_jammed(config);
 
   const YarnPlaces warp = warp_places(config);
   const YarnPlaces weft = weft_places(config);

@@ -57,7 +57,7 @@ struct YarnPaths {
   std::vector<YarnPath> weft;  // [pick]
 };
 
-/// Yarns steeper than this cannot be woven: the cloth is jammed.
+/// Yarns are laid no steeper than this; where that does not do, the cloth is jammed.
 inline constexpr double kSteepestSlope = 2.75;  // 70 degrees
 
 /// Throws std::invalid_argument where yarns jam, with the spacing and the thickness that would do,

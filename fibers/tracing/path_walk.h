@@ -6,7 +6,7 @@
 // given the outgoing one. A scattered ray starts at the hit point and ignores its own fiber.
 //
 // A Trace offers
-//   // tangent: unit, in the space of the directions; a Vertex may have a `float tint`, a factor of
+//   // tangent: unit, in the space of the directions; a Vertex may have an `Rgb tint`, a factor of
 //   // what is scattered there
 //   struct Vertex { Vec3 position; Vec3 tangent; std::uint16_t material; ... };
 //   // first hit, own fiber ignored

@@ -39,7 +39,7 @@ struct Setup {
   double drift_percent = 3;
   double across_mm = 2;
   double along_mm = 20;
-  double tint_percent = 6;
+  double tint_percent = 15;
 };
 
 struct Halves {

@@ -94,7 +94,7 @@ TEST_F(DraftReportEndToEnd, InfoOfADraftAndOfAFabricWithIt) {
   write_bytes(folder_.path() / "bad.wif", edited(kDraft, "4=1,4", "4=1,5"));
   const ProgramResult bad = run({"info", "bad.wif"});
   EXPECT_EQ(bad.status, 1);
-  EXPECT_NE(bad.error.find("bad.wif:29: expected the number of a shaft"), std::string::npos)
+  EXPECT_NE(bad.error.find("bad.wif:36: expected the number of a shaft"), std::string::npos)
       << bad.error;
 }
 

@@ -32,7 +32,7 @@ TEST(FabricReport, WeighsTheCloth) {
     expected += 100 * per_cm * (1 + crimp / 100) * tex * 1e-3;
   }
   EXPECT_NEAR(report["grams_per_m2"].get<double>(), expected, 0.01 * expected);
-  EXPECT_LE(report["interpenetration"]["percent_of_segments"].get<double>(), 2);
+  EXPECT_LE(report["interpenetration"]["percent_of_segments"].get<double>(), 5);
 }
 
 }  // namespace

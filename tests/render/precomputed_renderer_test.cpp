@@ -546,11 +546,12 @@ TEST(PrecomputedRenderer, TintsMultiplyWhatIsSeen) {
     hit.fabric = plain.fabric_position[k].cast<double>();
     const BlockPlace place = scene->tiling(0).place_of(hit.fabric);
     hit.part = (place.column + place.row) % 2 == 0 ? 0 : 1;
-    const float tint = scene->tint(hit);
+    const Rgb tint = scene->tint(hit);
     for (int c = 0; c < 3; ++c) {
-      EXPECT_NEAR(tinted.multiple[k][c], plain.multiple[k][c] * std::pow(tint, exponent[c]), 1e-5);
+      EXPECT_NEAR(tinted.multiple[k][c], plain.multiple[k][c] * std::pow(tint[c], exponent[c]),
+                  1e-5);
     }
-    changed += std::abs(tint - 1) > 0.02F ? 1 : 0;
+    changed += std::abs(tint[2] - 1) > 0.02F ? 1 : 0;
   }
   EXPECT_GT(changed, 50);
 }

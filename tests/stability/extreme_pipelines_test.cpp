@@ -61,9 +61,9 @@ void expect_sound(const SmallFabric& fabric, const std::string& what, Extremes& 
       extremes.least = std::min(extremes.least, ratio);
       if (is_constant) extremes.most = std::max(extremes.most, ratio);
       ++extremes.pictures;
-      // Constant light has one harmonic. Under sharp light few harmonics of lobes 0.1 degrees wide
-      // ring.
-      EXPECT_GT(ratio, is_constant ? 0 : -0.3) << light << render_method_name(method);
+      // Constant light has one harmonic; what narrow lobes let through comes back as 0, but for the
+      // noise of few paths. Under sharp light few harmonics of lobes 0.1 degrees wide ring.
+      EXPECT_GT(ratio, is_constant ? -0.01 : -0.3) << light << render_method_name(method);
       // Not reciprocal: many scatterings of this BCSDF may return 1.13 of constant light (known of
       // a bundle of cotton).
       if (is_constant) {

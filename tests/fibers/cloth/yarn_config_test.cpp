@@ -95,7 +95,7 @@ TEST(YarnConfig, ThreadsTakeTheColoursOfTheirDraft) {
 }
 
 TEST(YarnConfig, ErrorsSayWhatWouldDo) {
-  EXPECT_NE(message_of(cloth("yarn = \"a\"\nper_cm = 90")).find("at most 77"), std::string::npos)
+  EXPECT_NE(message_of(cloth("yarn = \"a\"\nper_cm = 90")).find("at most 78"), std::string::npos)
       << message_of(cloth("yarn = \"a\"\nper_cm = 90"));
   EXPECT_NE(message_of(cloth("sequence = [\"3 a\"]\nspacing_mm = 0.25")).find("a multiple of 3"),
             std::string::npos);
