@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "fibers/math/random.h"
+#include "fibers/math/wrapped.h"
 #include "formats/content_hash.h"
 #include "formats/input_error.h"
 
@@ -127,10 +128,8 @@ nlohmann::json beside_weave(const FabricDocument& document) {
 }  // namespace
 
 std::uint16_t BlockMap::at(int column, int row) const {
-  const int x = ((column % columns) + columns) % columns;
-  const int y = ((row % rows) + rows) % rows;
-  return fabric[static_cast<std::size_t>(y) * static_cast<std::size_t>(columns) +
-                static_cast<std::size_t>(x)];
+  return fabric[static_cast<std::size_t>(wrapped(row, rows)) * static_cast<std::size_t>(columns) +
+                static_cast<std::size_t>(wrapped(column, columns))];
 }
 
 BorderSample choose_border_sample(const BlockMap& pattern, int most_blocks, std::uint64_t seed) {

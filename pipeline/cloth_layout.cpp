@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "fibers/math/wrapped.h"
 #include "formats/input_error.h"
 
 namespace heddle {
@@ -12,11 +13,6 @@ namespace {
 /// Blocks that differ by less count as equally large: at a metre from the origin, a tenth of a
 /// fiber's radius.
 constexpr double kSameSize = 1e-6;
-
-int wrapped_place(int place, int count) {
-  const int rest = place % count;
-  return rest < 0 ? rest + count : rest;
-}
 
 }  // namespace
 
@@ -61,8 +57,8 @@ std::optional<BlockLayout> block_layout(const ClothConfig& cloth,
   layout.pattern.clear();
   for (int row = 0; row < pattern.rows; ++row) {
     for (int column = 0; column < pattern.columns; ++column) {
-      const int from_row = wrapped_place(row - pattern.corner_blocks[1], pattern.rows);
-      const int from_column = wrapped_place(column - pattern.corner_blocks[0], pattern.columns);
+      const int from_row = wrapped(row - pattern.corner_blocks[1], pattern.rows);
+      const int from_column = wrapped(column - pattern.corner_blocks[0], pattern.columns);
       const std::size_t from =
           static_cast<std::size_t>(from_row) * static_cast<std::size_t>(pattern.columns) +
           static_cast<std::size_t>(from_column);

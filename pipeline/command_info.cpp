@@ -93,7 +93,7 @@ Report describe_tensors(const fs::path& path, const CommonOptions& common) {
   }
   const auto kind = file.metadata().find("kind");
   if (kind != file.metadata().end() && kind->second == "fibers") {
-    describe_exemplar(read_exemplar(path), common.fabric_seed.value_or(1), report);
+    describe_exemplar(TileScene(read_exemplar(path)), common.fabric_seed.value_or(1), report);
   }
   return report;
 }
@@ -116,7 +116,7 @@ Report describe_pack(const fs::path& folder) {
   for (const auto& [name, file] : manifest.files)
     report["file." + name] = fmt::format("{} bytes, checksum holds", file.bytes);
   const FabricPack pack = load_pack(folder);
-  describe_exemplar(pack.exemplar, 1, report);
+  describe_exemplar(TileScene(pack.exemplar), 1, report);
   std::uint64_t segment_bytes = 0;
   for (const char* name : {"fibers.safetensors", "ssdf.safetensors", "sg.safetensors"}) {
     if (manifest.files.contains(name)) segment_bytes += bytes_without_basis(folder / name);

@@ -13,7 +13,6 @@
 #include "pipeline/chart/xml_text.h"
 #include "pipeline/commands.h"
 #include "pipeline/fabric_report.h"
-#include "pipeline/interrupt.h"
 #include "pipeline/job.h"
 #include "pipeline/swatch_picture.h"
 
@@ -32,15 +31,6 @@ constexpr double kNearMm = 6;
 void require_even(int spp) {
   if (spp % 2 != 0)
     throw ConfigError("--spp: expected an even number: traced pictures keep two halves");
-}
-
-std::function<void(double)> picture_progress(Progress& progress) {
-  return [&progress, shown = std::uint64_t{0}](double share) mutable {
-    stop_if_interrupted();
-    const auto now = static_cast<std::uint64_t>(100 * share);
-    progress.advance(now - shown);
-    shown = now;
-  };
 }
 
 /// Of table 1 and the supplement of Khungurn et al. 2017, as far as they are public in text.
@@ -113,14 +103,14 @@ std::string section_of(const fs::path& fabric, const CatalogueOptions& options, 
     write_swatch(
         options.output / name,
         trace_swatch(tile, config.light_from_both_sides, {width, options.pixels, options.spp},
-                     config.seed, picture_progress(progress)),
+                     config.seed, percent_of(progress)),
         options.pixels);
     figures += fmt::format(
         "<figure><img src=\"{}\" alt=\"\"><figcaption>{:.3g} mm</figcaption>"
         "</figure>\n",
         xml_text(name), width);
   }
-  Report report = fabric_report(stages.document());
+  Report report = fabric_report(stages.document(), tile.get());
   if (const std::string baked = baked_cells(stages, job.context().cache); !baked.empty())
     report["data"] = baked;
   if (const std::string paper = paper_cells(file); !paper.empty()) report["table 1"] = paper;
@@ -153,7 +143,7 @@ int swatch_command(const SwatchOptions& options, const CommonOptions& common) {
   write_swatch(options.output,
                trace_swatch(tile, stages.document().config.light_from_both_sides,
                             {options.width_mm, options.pixels, options.spp},
-                            stages.document().config.seed, picture_progress(progress)),
+                            stages.document().config.seed, percent_of(progress)),
                options.pixels);
   job.add_artifact(options.output);
   job.finish();

@@ -21,12 +21,12 @@ namespace {
 using Report = nlohmann::ordered_json;
 
 double tex_of(const YarnConfig& yarn, const FabricConfig& config) {
-  const FiberType& fiber = config.fibers[static_cast<std::size_t>(yarn.fiber)];
+  const FiberType& fiber = config.fiber_of(yarn);
   return yarn.plies * yarn.fibers_per_ply * fiber_tex(fiber.radius_mm, fiber.density_g_cm3);
 }
 
 Report yarn_report(const YarnConfig& yarn, const FabricConfig& config) {
-  const FiberType& fiber = config.fibers[static_cast<std::size_t>(yarn.fiber)];
+  const FiberType& fiber = config.fiber_of(yarn);
   Report report = {{"fiber", fiber.name},
                    {"fibers", yarn.plies * yarn.fibers_per_ply},
                    {"section_mm", {rounded(yarn.width_mm), rounded(yarn.height_mm)}},
@@ -50,8 +50,7 @@ SystemFacts facts_of(const FabricConfig& config, const ThreadSystem& system,
                      const YarnPlaces& places, const std::vector<YarnPath>& paths) {
   SystemFacts facts;
   for (std::size_t k = 0; k < paths.size(); ++k) {
-    const YarnConfig& yarn =
-        config.yarns[static_cast<std::size_t>(system.yarn_at(static_cast<int>(k)))];
+    const YarnConfig& yarn = config.yarn(system.yarn_at(static_cast<int>(k)));
     facts.cover += yarn.width_mm / places.period_mm;
     const double crimp = paths[k].shape->crimp();
     facts.crimp += crimp / static_cast<double>(paths.size());
@@ -105,9 +104,9 @@ double rounded(double value) {
   return std::stod(fmt::format("{:.4g}", value));
 }
 
-void describe_exemplar(const Exemplar& exemplar, std::uint64_t seed, Report& report) {
+void describe_exemplar(const TileScene& scene, std::uint64_t seed, Report& report) {
+  const Exemplar& exemplar = scene.exemplar();
   const ExemplarSummary summary = summarize(exemplar);
-  const TileScene scene(exemplar);
   report["fibers"] = summary.fibers;
   report["segments"] = summary.segments;
   report["tile_mm"] = {rounded(exemplar.width_mm), rounded(exemplar.height_mm)};
@@ -128,7 +127,7 @@ void describe_exemplar(const Exemplar& exemplar, std::uint64_t seed, Report& rep
   report["ray_tracing_bytes"] = scene.memory_bytes();
 }
 
-Report fabric_report(const FabricDocument& fabric) {
+Report fabric_report(const FabricDocument& fabric, const TileScene* fibers) {
   const FabricConfig& config = fabric.config;
   Report report = {{"kind", "fabric config"}, {"name", config.name}};
   report["light_from"] = config.light_from_both_sides ? "both" : "face";
@@ -148,7 +147,11 @@ Report fabric_report(const FabricDocument& fabric) {
     }
     for (const YarnConfig& yarn : config.yarns)
       report["yarns"][yarn.name] = yarn_report(yarn, config);
-    describe_exemplar(synthesize(config), config.seed, report);
+    if (fibers != nullptr) {
+      describe_exemplar(*fibers, config.seed, report);
+    } else {
+      describe_exemplar(TileScene(synthesize(config)), config.seed, report);
+    }
   } catch (const std::invalid_argument& error) {
     throw ConfigError(fmt::format("{}: {}", fabric.file.string(), error.what()));
   }

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <nlohmann/json_fwd.hpp>
 
-#include "fibers/cloth/exemplar.h"
+#include "fibers/tracing/tile_scene.h"
 #include "pipeline/stages.h"
 
 namespace heddle {
@@ -15,12 +15,13 @@ namespace heddle {
 double rounded(double value);
 
 /// Adds counts, sizes, densities and interpenetration of the fibers.
-void describe_exemplar(const Exemplar& exemplar, std::uint64_t seed,
-                       nlohmann::ordered_json& report);
+void describe_exemplar(const TileScene& fibers, std::uint64_t seed, nlohmann::ordered_json& report);
 
-/// Weave, threads and yarns, then the exemplar that the config gives. Errors: ConfigError naming
+/// Weave, threads and yarns, then the exemplar that the config gives; `fibers` where it is at hand,
+/// else it is made. Errors: ConfigError naming
 /// the file where yarns jam.
-nlohmann::ordered_json fabric_report(const FabricDocument& fabric);
+nlohmann::ordered_json fabric_report(const FabricDocument& fabric,
+                                     const TileScene* fibers = nullptr);
 
 }  // namespace heddle
 

@@ -222,6 +222,17 @@ void add_stages(CLI::App& app, Options& options, Actions& actions) {
   }
 }
 
+/// Of commands that draw fabrics without a scene.
+void add_picture_size(CLI::App& command, int& pixels, int& spp) {
+  command
+      .add_option("--pixels", pixels,
+                  "Along each side of a picture; " + std::to_string(pixels) + " by default")
+      ->check(CLI::Range(1, 4096));
+  command
+      .add_option("--spp", spp, "Samples per pixel, even; " + std::to_string(spp) + " by default")
+      ->check(CLI::Range(2, 1 << 20));
+}
+
 void add_swatch(CLI::App& app, Options& options, Actions& actions) {
   CLI::App* swatch =
       app.add_subcommand("swatch", "A path-traced picture of a fabric, no scene needed");
@@ -232,10 +243,7 @@ void add_swatch(CLI::App& app, Options& options, Actions& actions) {
   swatch->add_option("-o,--output,--outfile", asked.output, "The .png")->required();
   swatch->add_option("--width-mm", asked.width_mm, "Cloth across the picture; 4 by default")
       ->check(CLI::Range(0.01, 1000.0));
-  swatch->add_option("--pixels", asked.pixels, "Along each side; 256 by default")
-      ->check(CLI::Range(1, 4096));
-  swatch->add_option("--spp", asked.spp, "Samples per pixel, even; 16 by default")
-      ->check(CLI::Range(2, 1 << 20));
+  add_picture_size(*swatch, asked.pixels, asked.spp);
   actions["swatch"] = [&options] { return swatch_command(options.swatch, options.common); };
 }
 
@@ -246,10 +254,7 @@ void add_catalogue(CLI::App& app, Options& options, Actions& actions) {
   add_building(*catalogue, options);
   catalogue->add_option("FABRIC.toml", asked.fabrics, "Fabric configs")->required();
   catalogue->add_option("-o,--output,--outfile", asked.output, "Folder of the page")->required();
-  catalogue->add_option("--pixels", asked.pixels, "Along each side of a picture; 256 by default")
-      ->check(CLI::Range(1, 4096));
-  catalogue->add_option("--spp", asked.spp, "Samples per pixel, even; 32 by default")
-      ->check(CLI::Range(2, 1 << 20));
+  add_picture_size(*catalogue, asked.pixels, asked.spp);
   actions["catalogue"] = [&options] {
     return catalogue_command(options.catalogue, options.common);
   };

@@ -75,14 +75,16 @@ void announce(Console* console, const char* stage, double items, const char* uni
                   static_cast<std::uint64_t>(bytes));
 }
 
-/// Advances a progress of 100 items by the share done.
-AccuracyProgress percent_of(Progress& progress) {
-  return [&progress, shown = std::uint64_t{0}](double share) mutable {
-    stop_if_interrupted();
-    const auto now = static_cast<std::uint64_t>(100 * std::min(share, 1.0));
-    progress.advance(now - shown);
-    shown = now;
-  };
+/// Memory for all maps, and two copies while they are written.
+double maps_bytes(double segments, bool both_sides) {
+  return 3.0 * (both_sides ? 2048 : 1024) * segments;
+}
+
+/// Memory for the matrices of all cells: chunks, what is assembled of them, and two copies while
+/// that is written.
+double transfer_bytes(double cells, int order) {
+  const double bands = (order + 1) * (order + 1);
+  return 3 * 3 * sizeof(float) * bands * bands * cells;
 }
 
 // Circles in a hexagonal pattern fill this share of a plane.
@@ -90,7 +92,7 @@ constexpr double kDensestFill = 0.9069;
 
 void warn_of_crowded_yarns(const FabricConfig& config, Console& console) {
   for (const YarnConfig& yarn : config.yarns) {
-    const double fill = fill_of(yarn, config.fibers[static_cast<std::size_t>(yarn.fiber)]);
+    const double fill = fill_of(yarn, config.fiber_of(yarn));
     if (fill <= kDensestFill) continue;
     console.warn(fmt::format(
         "{}: the yarn \"{}\" of {:.3g} x {:.3g} mm has room for {:.0f} fibers at most, and holds "
@@ -115,6 +117,15 @@ std::string hash_of_geometry(const Exemplar& exemplar) {
 }
 
 }  // namespace
+
+std::function<void(double)> percent_of(Progress& progress) {
+  return [&progress, shown = std::uint64_t{0}](double share) mutable {
+    stop_if_interrupted();
+    const auto now = static_cast<std::uint64_t>(100 * std::min(share, 1.0));
+    progress.advance(now - shown);
+    shown = now;
+  };
+}
 
 FabricDocument read_fabric_document(const fs::path& path, std::optional<std::uint64_t> seed,
                                     const FabricVariant& variant) {
@@ -453,9 +464,8 @@ Artifact FabricStages::maps() {
   const Stage stage = maps_stage();
   Artifact artifact = artifact_of(stage, [&](const fs::path& path, StageResult& result) {
     const auto segments = static_cast<std::uint32_t>(exemplar().segment_count());
-    // All maps, and two copies while they are written.
-    const double map_bytes = document_.config.light_from_both_sides ? 2048 : 1024;
-    announce(context_->console, "visibility", segments, "segments", 3 * map_bytes * segments);
+    announce(context_->console, "visibility", segments, "segments",
+             maps_bytes(segments, document_.config.light_from_both_sides));
     const auto compute = [&](const fs::path& file, std::uint32_t first, std::uint32_t end) {
       compute_maps(stage, file, first, end);
     };
@@ -574,11 +584,7 @@ Artifact FabricStages::transfer(std::optional<int> order) {
   Artifact artifact = artifact_of(stage, [&](const fs::path& path, StageResult& result) {
     const auto work = transfer_work(settings);
     const std::uint32_t cells = work->baker->cell_count();
-    // Matrices of all cells: chunks, what is assembled of them, and two copies while that is
-    // written.
-    const double bands = (settings.order + 1) * (settings.order + 1);
-    announce(context_->console, "transfer", cells, "cells",
-             3 * 3 * sizeof(float) * bands * bands * cells);
+    announce(context_->console, "transfer", cells, "cells", transfer_bytes(cells, settings.order));
     const auto compute = [&](const fs::path& file, std::uint32_t first, std::uint32_t end) {
       work->compute(file, first, end);
     };
@@ -760,7 +766,7 @@ std::vector<StageForecast> FabricStages::forecast(std::optional<int> order) {
       .present = is_present(maps_stage()) || (is_present(ssdf_stage()) && is_present(sg_stage())),
       .items = static_cast<double>(segments),
       .unit = "segments",
-      .bytes = 3.0 * (both_sides ? 2048 : 1024) * segments};
+      .bytes = maps_bytes(segments, both_sides)};
   if (!maps.present) {
     maps.core_seconds = time_of(segments, [&](std::uint32_t first, std::uint32_t end) {
       bake_visibility_maps(scene(), origins(), both_sides, first, end);
@@ -772,10 +778,9 @@ std::vector<StageForecast> FabricStages::forecast(std::optional<int> order) {
       .stage = "transfer", .present = is_present(transfer_stage(settings)), .unit = "cells"};
   if (!transfer.present) {
     const auto work = transfer_work(settings);
-    const double bands = (settings.order + 1) * (settings.order + 1);
     const std::uint32_t cells = work->baker->cell_count();
     transfer.items = cells;
-    transfer.bytes = 3 * 3 * sizeof(float) * bands * bands * cells;
+    transfer.bytes = transfer_bytes(cells, settings.order);
     transfer.core_seconds = time_of(
         cells, [&](std::uint32_t first, std::uint32_t end) { work->baker->bake(first, end); });
   }

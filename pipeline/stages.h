@@ -97,6 +97,9 @@ struct FabricVariant {
   auto operator<=>(const FabricVariant&) const = default;
 };
 
+/// Advances a progress of 100 items by the share done; throws where the command was interrupted.
+std::function<void(double)> percent_of(Progress& progress);
+
 /// What it took to build an artifact, without what it read, as its record says.
 struct StageCost {
   std::string stage;

@@ -7,16 +7,12 @@
 #include <cmath>
 #include <limits>
 
+#include "fibers/math/wrapped.h"
 #include "formats/input_error.h"
 #include "formats/memory_need.h"
 
 namespace heddle {
 namespace {
-
-int wrap_index(int i, int n) {
-  const int r = i % n;
-  return r < 0 ? r + n : r;
-}
 
 float squared_distance_to_segment(const Vec3& p, const Vec3& a, const Vec3& b) {
   const Vec3 along = b - a;
@@ -78,7 +74,7 @@ IdVolume voxelize(const Exemplar& exemplar, const VolumeSettings& settings) {
     for (int z = low[2]; z <= high[2]; ++z) {
       for (int y = low[1]; y <= high[1]; ++y) {
         const std::size_t row =
-            (static_cast<std::size_t>(z) * volume.size[1] + wrap_index(y, volume.size[1])) *
+            (static_cast<std::size_t>(z) * volume.size[1] + wrapped(y, volume.size[1])) *
             volume.size[0];
         for (int x = low[0]; x <= high[0]; ++x) {
           const Vec3 centre(
@@ -86,7 +82,7 @@ IdVolume voxelize(const Exemplar& exemplar, const VolumeSettings& settings) {
               static_cast<float>(volume.origin_mm[1] + (y + 0.5) * volume.voxel_mm[1]),
               static_cast<float>(volume.origin_mm[2] + (z + 0.5) * volume.voxel_mm[2]));
           const float squared = squared_distance_to_segment(centre, a, b);
-          const std::size_t voxel = row + wrap_index(x, volume.size[0]);
+          const std::size_t voxel = row + wrapped(x, volume.size[0]);
           if (squared <= radius * radius && squared < nearest[voxel]) {
             nearest[voxel] = squared;
             volume.ids[voxel] = static_cast<std::int32_t>(s);

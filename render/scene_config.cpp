@@ -10,6 +10,7 @@
 #include <string_view>
 
 #include "formats/image_file.h"
+#include "formats/srgb_color.h"
 #include "render/environment_map.h"
 #include "render/surface/surface_presets.h"
 
@@ -215,14 +216,11 @@ PatternConfig read_pattern(const TomlTable& table) {
   PatternConfig pattern;
   std::map<std::string, std::uint16_t> fabric_of;  // by colour
   for (const TomlTable& fabric : table.tables("fabric")) {
-    std::string color = fabric.string("color");
-    std::transform(color.begin(), color.end(), color.begin(),
-                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-    if (color.size() != 7 || color[0] != '#' ||
-        color.find_first_not_of("0123456789abcdef", 1) != std::string::npos) {
-      fabric.fail("color", "expected a colour of the picture as \"#rrggbb\"");
-    }
-    if (!fabric_of.emplace(color, static_cast<std::uint16_t>(pattern.fabrics.size())).second)
+    const auto color = bytes_of_hex(fabric.string("color"));
+    if (!color) fabric.fail("color", "expected a colour of the picture as \"#rrggbb\"");
+    if (!fabric_of
+             .emplace(hex_of(color->data()), static_cast<std::uint16_t>(pattern.fabrics.size()))
+             .second)
       fabric.fail("color", "expected a colour that no other fabric of the pattern has");
     pattern.fabrics.push_back(fabric.existing_file("file"));
   }

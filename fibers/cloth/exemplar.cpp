@@ -94,6 +94,14 @@ constexpr std::size_t kScatteringNumbers = 10;
 
 }  // namespace
 
+void end_fiber(Exemplar& e, double radius_mm, int material, std::uint32_t yarn, bool is_open) {
+  e.first_point.push_back(static_cast<std::uint32_t>(e.points.size()));
+  e.radius_mm.push_back(static_cast<float>(radius_mm));
+  e.material.push_back(static_cast<std::uint16_t>(material));
+  e.yarn.push_back(yarn);
+  e.is_open.push_back(is_open ? 1 : 0);
+}
+
 void index_segments(Exemplar& e) {
   e.yarn.resize(e.fiber_count(), 0);
   e.is_open.resize(e.fiber_count(), 0);

@@ -68,6 +68,10 @@ struct Exemplar {
   std::uint16_t segment_material(std::uint32_t s) const { return material[segment_fiber[s]]; }
 };
 
+/// Makes a fiber of the points that were appended since the last one.
+void end_fiber(Exemplar& exemplar, double radius_mm, int material, std::uint32_t yarn,
+               bool is_open);
+
 /// Fills the derived arrays from the others, and `yarn` and `is_open` where they are shorter than
 /// the list of fibers.
 void index_segments(Exemplar& exemplar);

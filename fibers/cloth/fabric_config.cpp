@@ -72,11 +72,6 @@ std::vector<int> read_sequence(const TomlTable& table, const std::string& name,
   return {static_cast<int>(config.yarns.size()) - 1};
 }
 
-double room_of(const FabricConfig& config, const ThreadSystem& system, int place) {
-  const double own = config.yarns[static_cast<std::size_t>(system.yarn_at(place))].spacing_mm;
-  return own > 0 ? own : system.spacing_mm;
-}
-
 /// How often the repeat of the weave must be laid so that whole sequences fit.
 int fitting_repeats(int of_weave, std::size_t of_sequence) {
   return std::lcm(of_weave, static_cast<int>(of_sequence)) / of_weave;
@@ -104,7 +99,7 @@ void take_draft_colors(const TomlTable& table, const SystemKeys& keys, FabricCon
   std::vector<int> sequence;
   for (int k = 0; k < keys.of_weave; ++k) {
     const int plain = system.yarn_at(k);
-    YarnConfig yarn = config.yarns[static_cast<std::size_t>(plain)];
+    YarnConfig yarn = config.yarn(plain);
     const std::array<float, 3>& color = threads.color[static_cast<std::size_t>(k)];
     yarn.fiber = dyed_fiber(yarn.fiber, Rgbd(color[0], color[1], color[2]), config.fibers);
     const auto [found, is_new] =
@@ -140,11 +135,11 @@ ThreadSystem read_system(const TomlTable& document, const SystemKeys& keys, Fabr
                            system.sequence.size(), keys.table));
   }
   double size = 0;
-  for (int k = 0; k < count; ++k) size += room_of(config, system, k);
+  for (int k = 0; k < count; ++k) size += config.room_mm(system, k);
   check_tile(weave, keys.repeats, size);
-  for (const int k : system.sequence) {
-    const YarnConfig& yarn = config.yarns[static_cast<std::size_t>(k)];
-    const double room = yarn.spacing_mm > 0 ? yarn.spacing_mm : system.spacing_mm;
+  for (int k = 0; k < static_cast<int>(system.sequence.size()); ++k) {
+    const YarnConfig& yarn = config.yarn(system.yarn_at(k));
+    const double room = config.room_mm(system, k);
     if (yarn.width_mm <= room) continue;
     const std::string what = fmt::format(
         "expected at most spacing_mm, {:.4g} mm here: neighbouring yarns overlap", room);
@@ -170,22 +165,12 @@ void read_woven(const TomlTable& document, FabricConfig& config) {
       read_system(document, {"weft", "repeats_y", config.weave.picks, config.repeats_y}, config);
 }
 
-int fiber_named(const TomlTable& table, const FabricConfig& config) {
-  const std::string name = table.string("fiber");
-  std::string known;
-  for (std::size_t k = 0; k < config.fibers.size(); ++k) {
-    if (config.fibers[k].name == name) return static_cast<int>(k);
-    known += (known.empty() ? "" : ", ") + config.fibers[k].name;
-  }
-  table.fail("fiber", "expected the name of a [fiber.NAME] table: " + known);
-}
-
 void read_found(const TomlTable& table, FabricConfig& config) {
   config.curves = read_curves_config(table);
   if (config.curves->as_yarns) {
     config.curves->sequence = read_sequence(table, "curves", config);
   } else {
-    config.curves->fiber = fiber_named(table, config);
+    config.curves->fiber = find_fiber(table, config.fibers);
   }
 }
 
@@ -229,7 +214,7 @@ FabricConfig read_fabric_config(const TomlTable& document) {
   }
   if (const auto pile = document.optional_table("pile")) {
     config.pile = read_pile(*pile);
-    config.pile->fiber = fiber_named(*pile, config);
+    config.pile->fiber = find_fiber(*pile, config.fibers);
   }
   if (config.fibers.size() > kMaxMaterials) {
     document.fail("yarn", fmt::format("expected at most {} fibers in different colours, found {}",

@@ -52,11 +52,10 @@ struct FabricConfig {
   const FiberType& fiber_of(const YarnConfig& yarn) const {
     return fibers[static_cast<std::size_t>(yarn.fiber)];
   }
-  const YarnConfig& warp_yarn(int end) const {
-    return yarns[static_cast<std::size_t>(warp.yarn_at(end))];
-  }
-  const YarnConfig& weft_yarn(int pick) const {
-    return yarns[static_cast<std::size_t>(weft.yarn_at(pick))];
+  /// What a yarn of a system has between its neighbours (mm).
+  double room_mm(const ThreadSystem& system, int place) const {
+    const double own = yarn(system.yarn_at(place)).spacing_mm;
+    return own > 0 ? own : system.spacing_mm;
   }
 };
 

@@ -196,9 +196,8 @@ class FibersOfYarn {
                   ply_phase_[static_cast<std::size_t>(ply)] + kTurn * twist_.yarn_turns * share);
   }
 
-  // From the yarn's unit disc to the cloth.
-  Vec3d in_cloth(double share, const Vec2d& place) const {
-    const YarnPlace yarn = place_along(line_, share);
+  // From the yarn's unit disc to the cloth. `yarn`: the yarn's own place at that share.
+  Vec3d in_cloth(const YarnPlace& yarn, double share, const Vec2d& place) const {
     const double thickness = thickness_.at(share);
     const Vec2d half(thickness * (yarn.half_width_mm - fiber_radius_),
                      thickness * (yarn.half_height_mm - fiber_radius_));
@@ -211,8 +210,8 @@ class FibersOfYarn {
   Vec3d point_of(const FiberOfPly& fiber, double share, const Loop* loop) const {
     const Vec2d beside = in_ply(fiber, share);
     Vec2d place = in_yarn(fiber.ply, share, beside);
+    const YarnPlace yarn = place_along(line_, share);
     if (yarn_.wander_rms > 0) {
-      const YarnPlace yarn = place_along(line_, share);
       place.x() += wander_at(fiber.wander_side, share) / (yarn.half_width_mm - fiber_radius_);
       place.y() += wander_at(fiber.wander_up, share) / (yarn.half_height_mm - fiber_radius_);
     }
@@ -225,7 +224,7 @@ class FibersOfYarn {
         place += in_yarn(fiber.ply, share, beside * (1 + rise)) - in_yarn(fiber.ply, share, beside);
       }
     }
-    return in_cloth(share, place);
+    return in_cloth(yarn, share, place);
   }
 
   void add_ply(int ply, double pattern_phase) {
@@ -244,7 +243,7 @@ class FibersOfYarn {
         }
         add_point(point_of(fibers[i], share, nearest));
       }
-      end_fiber(line_.is_open);
+      end_own_fiber(line_.is_open);
     }
   }
 
@@ -298,7 +297,7 @@ class FibersOfYarn {
         const double share = arc.start_share + t * arc.along;
         const double radius = (arc.start_mm + t * arc.rise_mm) / round_radius_;
         const Vec2d beside = turned({radius, 0}, arc.start_angle + t * arc.around);
-        return in_cloth(share, in_yarn(ply, share, beside));
+        return in_cloth(place_along(line_, share), share, in_yarn(ply, share, beside));
       };
       double from = -arc.buried;
       double to = 1;
@@ -348,7 +347,8 @@ class FibersOfYarn {
     const int count = draw_count(yarn_.neps.per_mm * line_.length_mm, random);
     for (int n = 0; n < count; ++n) {
       const double share = random.uniform_double();
-      const Vec3d centre = in_cloth(share, turned({1, 0}, kTurn * random.uniform_double()));
+      const Vec3d centre = in_cloth(place_along(line_, share), share,
+                                    turned({1, 0}, kTurn * random.uniform_double()));
       const double radius = std::max(2 * fiber_radius_, 0.5 * yarn_.neps.diameter_mm.draw(random));
       for (int i = 0; i < yarn_.neps.fibers; ++i) {
         std::array<Vec3d, kNepModes> cosines;
@@ -377,17 +377,13 @@ class FibersOfYarn {
     const int segments = std::clamp(static_cast<int>(std::ceil(length_mm / segment_mm_)),
                                     kFewestSegments, kMostSegmentsPerFiber);
     for (int k = 0; k <= segments; ++k) add_point(point_at(from + (to - from) * k / segments));
-    end_fiber(true);
+    end_own_fiber(true);
   }
 
   void add_point(const Vec3d& point) { exemplar_.points.push_back(point.cast<float>()); }
 
-  void end_fiber(bool is_open) {
-    exemplar_.first_point.push_back(static_cast<std::uint32_t>(exemplar_.points.size()));
-    exemplar_.radius_mm.push_back(static_cast<float>(fiber_radius_));
-    exemplar_.material.push_back(static_cast<std::uint16_t>(yarn_.fiber));
-    exemplar_.yarn.push_back(index_);
-    exemplar_.is_open.push_back(is_open ? 1 : 0);
+  void end_own_fiber(bool is_open) {
+    end_fiber(exemplar_, fiber_radius_, yarn_.fiber, index_, is_open);
   }
 
   const YarnConfig& yarn_;

@@ -8,6 +8,8 @@
 #include <compare>
 #include <vector>
 
+#include "fibers/math/wrapped.h"
+
 namespace heddle {
 namespace {
 
@@ -71,7 +73,7 @@ class SegmentGrid {
     const auto along = [&](int axis, float x) {
       const int cell = static_cast<int>(std::floor(x * per_mm_[axis]));
       const int n = count_[static_cast<std::size_t>(axis)];
-      return axis == 2 ? std::clamp(cell, 0, n - 1) : ((cell % n) + n) % n;
+      return axis == 2 ? std::clamp(cell, 0, n - 1) : wrapped(cell, n);
     };
     return {along(0, place.x()), along(1, place.y()), along(2, place.z() - exemplar_->z_min)};
   }

@@ -181,11 +181,7 @@ void add_pile(const PileConfig& pile, double fiber_radius_mm, double segment_mm,
     }
     if (points.size() < 3) continue;
     for (const Vec3d& point : points) exemplar.points.push_back(point.cast<float>());
-    exemplar.first_point.push_back(static_cast<std::uint32_t>(exemplar.points.size()));
-    exemplar.radius_mm.push_back(static_cast<float>(fiber_radius_mm));
-    exemplar.material.push_back(static_cast<std::uint16_t>(pile.fiber));
-    exemplar.yarn.push_back(yarn_index);
-    exemplar.is_open.push_back(1);
+    end_fiber(exemplar, fiber_radius_mm, pile.fiber, yarn_index, true);
   }
 }
 

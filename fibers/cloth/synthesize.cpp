@@ -44,12 +44,9 @@ void add_curves(const FabricConfig& config, Exemplar& exemplar, const AddYarn& a
       continue;
     }
     for (const Vec3d& point : curve.points) exemplar.points.push_back(point.cast<float>());
-    exemplar.first_point.push_back(static_cast<std::uint32_t>(exemplar.points.size()));
-    exemplar.radius_mm.push_back(static_cast<float>(
-        curves.radius_mm(curve, config.fibers[static_cast<std::size_t>(curves.fiber)].radius_mm)));
-    exemplar.material.push_back(static_cast<std::uint16_t>(curves.fiber));
-    exemplar.yarn.push_back(static_cast<std::uint32_t>(curve.curve));
-    exemplar.is_open.push_back(curve.is_open ? 1 : 0);
+    const double own = config.fibers[static_cast<std::size_t>(curves.fiber)].radius_mm;
+    end_fiber(exemplar, curves.radius_mm(curve, own), curves.fiber,
+              static_cast<std::uint32_t>(curve.curve), curve.is_open);
   }
 }
 

@@ -12,6 +12,8 @@
 #include <string_view>
 #include <vector>
 
+#include "fibers/math/wrapped.h"
+
 namespace heddle {
 
 /// Ends, and picks, of the largest weave.
@@ -44,9 +46,7 @@ struct Weave {
 
   /// Is the warp over the weft where end and pick cross? Indices wrap.
   bool is_warp_up(int end, int pick) const {
-    const int e = ((end % ends) + ends) % ends;
-    const int p = ((pick % picks) + picks) % picks;
-    return warp_up[static_cast<std::size_t>(p) * ends + e] != 0;
+    return warp_up[static_cast<std::size_t>(wrapped(pick, picks)) * ends + wrapped(end, ends)] != 0;
   }
 };
 

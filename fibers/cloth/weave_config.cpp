@@ -47,14 +47,17 @@ DraftThreads threads_of_draft(const WifThreads& from) {
   return threads;
 }
 
+std::uint32_t number_of(const std::uint8_t* rgb) {
+  return std::uint32_t{rgb[0]} << 16 | std::uint32_t{rgb[1]} << 8 | rgb[2];
+}
+
 // "#rrggbb" as a number.
 std::uint32_t parse_color(const std::string& text) {
-  const bool is_color = text.size() == 7 && text[0] == '#' &&
-                        text.find_first_not_of("0123456789abcdefABCDEF", 1) == std::string::npos;
-  if (!is_color)
+  const auto bytes = bytes_of_hex(text);
+  if (!bytes)
     throw std::invalid_argument(
         fmt::format("expected colours \"#rrggbb\", found \"{:.10}\"", text));
-  return static_cast<std::uint32_t>(std::stoul(text.substr(1), nullptr, 16));
+  return number_of(bytes->data());
 }
 
 std::set<std::uint32_t> parse_colors(const std::vector<std::string>& texts) {
@@ -97,8 +100,7 @@ Weave weave_of_paper(const RgbPicture& picture, const PaperColors& colors,
   for (int row = picture.height; row-- > 0;) {
     for (int column = 0; column < picture.width; ++column) {
       const std::size_t at = 3 * (static_cast<std::size_t>(row) * picture.width + column);
-      const std::uint32_t color = std::uint32_t{picture.rgb[at]} << 16 |
-                                  std::uint32_t{picture.rgb[at + 1]} << 8 | picture.rgb[at + 2];
+      const std::uint32_t color = number_of(&picture.rgb[at]);
       absent.erase(color);
       bool up = warp.contains(color);
       if (warp.empty() && weft.empty()) {

@@ -61,16 +61,6 @@ double read_radius_mm(const TomlTable& table, FiberType& fiber) {
   return radius_mm;
 }
 
-int find_fiber(const TomlTable& table, const std::vector<FiberType>& fibers) {
-  const std::string name = table.string("fiber");
-  std::string known;
-  for (std::size_t k = 0; k < fibers.size(); ++k) {
-    if (fibers[k].name == name) return static_cast<int>(k);
-    known += (known.empty() ? "" : ", ") + fibers[k].name;
-  }
-  table.fail("fiber", "expected the name of a [fiber.NAME] table: " + known);
-}
-
 /// Plies and fibers: as told, or as many as the count asks for.
 void read_fibers_per_ply(const TomlTable& table, const std::optional<YarnCount>& count,
                          const FiberType& fiber, YarnConfig& yarn) {
@@ -132,6 +122,16 @@ void read_section(const TomlTable& table, bool has_count, const FiberType& fiber
 }
 
 }  // namespace
+
+int find_fiber(const TomlTable& table, const std::vector<FiberType>& fibers) {
+  const std::string name = table.string("fiber");
+  std::string known;
+  for (std::size_t k = 0; k < fibers.size(); ++k) {
+    if (fibers[k].name == name) return static_cast<int>(k);
+    known += (known.empty() ? "" : ", ") + fibers[k].name;
+  }
+  table.fail("fiber", "expected the name of a [fiber.NAME] table: " + known);
+}
 
 FiberType read_fiber(const TomlTable& table, const std::string& name) {
   FiberType fiber;

@@ -59,6 +59,9 @@ struct YarnConfig {
   double round_radius_mm(double fiber_radius_mm) const;
 };
 
+/// Index of the fiber type that the key `fiber` of a table names.
+int find_fiber(const TomlTable& table, const std::vector<FiberType>& fibers);
+
 /// Reads a table [fiber.NAME].
 FiberType read_fiber(const TomlTable& table, const std::string& name);
 

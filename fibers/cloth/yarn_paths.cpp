@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "fibers/math/taut_string.h"
+#include "fibers/math/wrapped.h"
 
 namespace heddle {
 namespace {
@@ -42,8 +43,7 @@ double section(double distance, double half_width, double half_height) {
 YarnPlaces places(const FabricConfig& config, const ThreadSystem& system, int count) {
   YarnPlaces result;
   for (int k = 0; k < count; ++k) {
-    const double own = config.yarns[static_cast<std::size_t>(system.yarn_at(k))].spacing_mm;
-    const double spacing = own > 0 ? own : system.spacing_mm;
+    const double spacing = config.room_mm(system, k);
     result.centre_mm.push_back(result.period_mm + 0.5 * spacing);
     result.spacing_mm.push_back(spacing);
     result.period_mm += spacing;
@@ -162,7 +162,7 @@ class Loom {
     result.room = where.spacing_mm;
     result.period = where.period_mm;
     for (int k = 0; k < count; ++k) {
-      const YarnConfig& yarn = config.yarns[static_cast<std::size_t>(threads.yarn_at(k))];
+      const YarnConfig& yarn = config.yarn(threads.yarn_at(k));
       result.width.push_back(0.5 * yarn.width_mm);
       result.height.push_back(0.5 * yarn.height_mm);
       result.yield.push_back(yarn.contact_flattening);
@@ -365,8 +365,7 @@ std::optional<double> cure(double limit, Config&& config) {
 }
 
 double at_sample(const std::vector<double>& values, std::ptrdiff_t i) {
-  const auto n = static_cast<std::ptrdiff_t>(values.size());
-  return values[static_cast<std::size_t>(((i % n) + n) % n)];
+  return values[static_cast<std::size_t>(wrapped(i, static_cast<std::ptrdiff_t>(values.size())))];
 }
 
 double linear_at(const std::vector<double>& values, double step, double along) {

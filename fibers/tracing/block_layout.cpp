@@ -1,22 +1,21 @@
 #include "fibers/tracing/block_layout.h"
 
 #include "fibers/math/random.h"
+#include "fibers/math/wrapped.h"
 
 namespace heddle {
 namespace {
 
-/// Remainder in [0, count).
-int wrapped(std::int64_t place, int count) {
-  const std::int64_t rest = place % count;
-  return static_cast<int>(rest < 0 ? rest + count : rest);
+int place_of(std::int64_t place, int count) {
+  return static_cast<int>(wrapped<std::int64_t>(place, count));
 }
 
 }  // namespace
 
 BlockLayout::Block BlockLayout::at(std::int64_t column, std::int64_t row) const {
   Block block =
-      pattern[static_cast<std::size_t>(wrapped(row, rows)) * static_cast<std::size_t>(columns) +
-              static_cast<std::size_t>(wrapped(column, columns))];
+      pattern[static_cast<std::size_t>(place_of(row, rows)) * static_cast<std::size_t>(columns) +
+              static_cast<std::size_t>(place_of(column, columns))];
   if (block.column != kByOrder) return block;
   const std::array<int, 2>& blocks = tile_blocks[block.exemplar];
   if (order == BlockOrder::kScattered) {
@@ -25,8 +24,8 @@ BlockLayout::Block BlockLayout::at(std::int64_t column, std::int64_t row) const 
     block.column = static_cast<int>(random.index(static_cast<std::uint64_t>(blocks[0])));
     block.row = static_cast<int>(random.index(static_cast<std::uint64_t>(blocks[1])));
   } else {
-    block.column = wrapped(column, blocks[0]);
-    block.row = wrapped(row, blocks[1]);
+    block.column = place_of(column, blocks[0]);
+    block.row = place_of(row, blocks[1]);
   }
   return block;
 }

@@ -9,14 +9,11 @@
 #include <string>
 
 #include "fibers/cloth/weave_config.h"
+#include "fibers/math/wrapped.h"
 #include "formats/memory_need.h"
 
 namespace heddle {
 namespace {
-
-int wrapped(int index, int count) {
-  return ((index % count) + count) % count;
-}
 
 std::vector<double> edges_of(const std::vector<double>& widths) {
   std::vector<double> edges = {0.0};

@@ -23,6 +23,7 @@
 #include <string>
 #include <vector>
 
+#include "fibers/cloth/yarn_paths.h"
 #include "pipeline/job.h"
 #include "pipeline/scene_job.h"
 
@@ -138,8 +139,8 @@ double relative_rmse(const Halves& fast, const Halves& reference, int size, int 
 void measure(const Setup& setup, StageContext& context) {
   const FabricDocument fabric = read_fabric_document(setup.fabric, {});
   const FabricConfig& cloth = fabric.config;
-  const double width = cloth.repeats_x * cloth.weave.ends * cloth.warp.spacing_mm;
-  const double height = cloth.repeats_y * cloth.weave.picks * cloth.weft.spacing_mm;
+  const double width = warp_places(cloth).period_mm;
+  const double height = weft_places(cloth).period_mm;
   const int size = setup.tiles * setup.pixels;
   const int lag_x = setup.pixels;
   const int lag_y = static_cast<int>(std::lround(setup.pixels * height / width));

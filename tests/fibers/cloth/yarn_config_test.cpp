@@ -87,7 +87,7 @@ TEST(YarnConfig, ThreadsTakeTheColoursOfTheirDraft) {
   const FabricConfig config = read(text, (folder.path() / "cloth.toml").string());
   ASSERT_EQ(config.warp.sequence.size(), 4U);
   for (int end = 0; end < 4; ++end) {
-    const YarnConfig& yarn = config.warp_yarn(end);
+    const YarnConfig& yarn = config.yarn(config.warp.yarn_at(end));
     const Rgbd color = config.fibers[static_cast<std::size_t>(yarn.fiber)].scattering.color_tt;
     EXPECT_EQ(color[0] > 0.5, end != 1) << end;
     EXPECT_EQ(color[2] > 0.5, end == 1) << end;
