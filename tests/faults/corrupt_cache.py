@@ -11,7 +11,7 @@ import shutil
 import sys
 
 import workshop
-from workshop import PACK, PICTURES, States, content, differences, ended_by_signal, temporaries, tree
+from workshop import PACK, PICTURES, States, content, differences, ended_by_signal, fullest_first, temporaries, tree
 
 FLIPS = 4  # of each file that a command reads
 INFO_FLIPS = 6  # of each kind of file that `info` is shown
@@ -146,9 +146,9 @@ def readers(shop, states):
 
 
 def first_of_each_kind(stage):
-    """Two packs, or two pictures, are written and read alike."""
+    """Two packs, or two pictures, are written and read alike. Of two files of one size, the one in the fuller pack."""
     kinds = {}
-    for path in sorted(stage.rglob("*"), key=lambda path: (-path.stat().st_size, path)):
+    for path in sorted(stage.rglob("*"), key=lambda path: (-path.stat().st_size, *fullest_first(path))):
         if path.is_file():
             in_folder = path.name if path.parent != stage and path.parent.suffix != ".partial" else ""
             kinds.setdefault((in_folder, "".join(path.suffixes), path.parent.suffix), path)

@@ -11,7 +11,7 @@ import sys
 import time
 
 import workshop
-from workshop import PACK, PICTURE, PICTURES, Fault, States, differences, is_temporary, temporaries, tree
+from workshop import PACK, PICTURE, PICTURES, Fault, States, differences, fullest_first, is_temporary, temporaries, tree
 
 PROCESSES = 20
 DAY = 24 * 3600  # s
@@ -25,7 +25,7 @@ def own_output(arguments, number):
 def damaged(folder):
     """Breaks one artifact of each stage: a changed byte in the middle, or half the file."""
     for k, stage in enumerate(sorted((folder / "cache").iterdir())):
-        files = sorted(path for path in stage.rglob("*") if path.suffix in (".safetensors", ".vdb", ".exr"))
+        files = sorted((path for path in stage.rglob("*") if path.suffix in (".safetensors", ".vdb", ".exr")), key=fullest_first)
         data = bytearray(files[0].read_bytes())
         data[len(data) // 2] ^= 0x10
         files[0].write_bytes(data[:len(data) // 2] if k % 2 else data)

@@ -346,6 +346,11 @@ class States:
         return [stage for stage in self.stages if stage not in missing]
 
 
+def fullest_first(path):
+    """Sorts files of one name, those in the fuller folder first: all commands read the full pack, path tracing alone the other."""
+    return -len(list(path.parent.iterdir())), path
+
+
 def even_sample(count, most):
     """Numbers from 1 to count, the first and the last among them."""
     if count <= most:
