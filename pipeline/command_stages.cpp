@@ -69,7 +69,7 @@ void print_forecast(FabricStages& stages, std::optional<int> order, Job& job) {
                       {"memory_bytes", stage.bytes},
                       {"core_seconds", stage.core_seconds}});
     const double own = stage.core_seconds / working_threads();
-    seconds += own;
+    if (!stage.present) seconds += own;
     job.console().say(
         stage.present
             ? fmt::format("{}: in the cache", stage.stage)

@@ -28,11 +28,6 @@ constexpr double kFarOfNear = 10;
 constexpr double kNearRepeats = 1.5;
 constexpr double kNearMm = 6;
 
-void require_even(int spp) {
-  if (spp % 2 != 0)
-    throw ConfigError("--spp: expected an even number: traced pictures keep two halves");
-}
-
 /// Of table 1 and the supplement of Khungurn et al. 2017, as far as they are public in text.
 struct PaperFabric {
   const char* file;  // of our counterpart, without its ending
@@ -102,7 +97,7 @@ std::string section_of(const fs::path& fabric, const CatalogueOptions& options, 
     Progress progress(job.console(), name, "%", 100);
     write_swatch(
         options.output / name,
-        trace_swatch(tile, config.light_from_both_sides, {width, options.pixels, options.spp},
+        trace_swatch(*tile, config.light_from_both_sides, {width, options.pixels, options.spp},
                      config.seed, percent_of(progress)),
         options.pixels);
     figures += fmt::format(
@@ -134,14 +129,13 @@ td:first-child {{ color: #666; white-space: nowrap; }}
 }  // namespace
 
 int swatch_command(const SwatchOptions& options, const CommonOptions& common) {
-  require_even(options.spp);
   Job job(common);
   require_writable(options.output);
   FabricStages stages(options.fabric, job.context());
   const auto tile = std::make_shared<const TileScene>(read_exemplar(stages.synth().path));
   Progress progress(job.console(), "swatch", "%", 100);
   write_swatch(options.output,
-               trace_swatch(tile, stages.document().config.light_from_both_sides,
+               trace_swatch(*tile, stages.document().config.light_from_both_sides,
                             {options.width_mm, options.pixels, options.spp},
                             stages.document().config.seed, percent_of(progress)),
                options.pixels);
@@ -151,7 +145,6 @@ int swatch_command(const SwatchOptions& options, const CommonOptions& common) {
 }
 
 int catalogue_command(const CatalogueOptions& options, const CommonOptions& common) {
-  require_even(options.spp);
   Job job(common);
   make_folder(options.output);
   std::string sections;

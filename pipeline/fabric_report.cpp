@@ -29,6 +29,7 @@ Report yarn_report(const YarnConfig& yarn, const FabricConfig& config) {
   const FiberType& fiber = config.fiber_of(yarn);
   Report report = {{"fiber", fiber.name},
                    {"fibers", yarn.plies * yarn.fibers_per_ply},
+                   {"fiber_radius_um", rounded(1000 * fiber.radius_mm)},
                    {"section_mm", {rounded(yarn.width_mm), rounded(yarn.height_mm)}},
                    {"filled", rounded(fill_of(yarn, fiber))}};
   if (fiber.density_g_cm3 > 0) {

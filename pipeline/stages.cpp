@@ -40,7 +40,7 @@ constexpr std::uint32_t kForecastProbes = 24;
 int version_of(std::string_view stage) {
   static const std::map<std::string_view, int> versions = {
       {"geometry", 1},        {"synth", 2},    {"maps", 3}, {"ssdf", 1},     {"sg", 1},
-      {"transfer", 4},        {"voxelize", 2}, {"pack", 1}, {"accuracy", 8}, {"surface-maps", 1},
+      {"transfer", 5},        {"voxelize", 2}, {"pack", 1}, {"accuracy", 8}, {"surface-maps", 1},
       {"surface-weights", 2},
   };
   return versions.at(stage);
@@ -768,8 +768,10 @@ std::vector<StageForecast> FabricStages::forecast(std::optional<int> order) {
       .unit = "segments",
       .bytes = maps_bytes(segments, both_sides)};
   if (!maps.present) {
+    // All origins are found once: that is no part of the time per segment.
+    const SegmentOrigins& from = origins();
     maps.core_seconds = time_of(segments, [&](std::uint32_t first, std::uint32_t end) {
-      bake_visibility_maps(scene(), origins(), both_sides, first, end);
+      bake_visibility_maps(scene(), from, both_sides, first, end);
     });
   }
   forecasts.push_back(maps);
@@ -785,6 +787,14 @@ std::vector<StageForecast> FabricStages::forecast(std::optional<int> order) {
         cells, [&](std::uint32_t first, std::uint32_t end) { work->baker->bake(first, end); });
   }
   forecasts.push_back(transfer);
+  Needs needs = kEverything;
+  needs.order = order;
+  for (const StageCost& cost : costs(needs)) {
+    for (StageForecast& stage : forecasts) {
+      if (stage.present && stage.stage == cost.stage && cost.seconds >= 0)
+        stage.core_seconds = cost.core_seconds;
+    }
+  }
   return forecasts;
 }
 

@@ -113,11 +113,11 @@ struct StageCost {
 /// What building an artifact is expected to take.
 struct StageForecast {
   std::string stage;
-  bool present = false;  // in the cache; then nothing else is told
+  bool present = false;  // in the cache; then its time is that which it took
   double items = 0;
   std::string unit;
   double bytes = 0;         // of memory, at the peak of the stage
-  double core_seconds = 0;  // processor time; 0 where it is not told
+  double core_seconds = 0;  // processor time; 0 where it is not known
 };
 
 /// A fabric file, read and checked.

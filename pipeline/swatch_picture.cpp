@@ -1,23 +1,21 @@
 #include "pipeline/swatch_picture.h"
 
-#include <cmath>
-#include <utility>
+#include <tbb/parallel_for.h>
 
+#include <cmath>
+
+#include "fibers/tracing/tile_trace.h"
 #include "formats/image_file.h"
-#include "render/camera.h"
-#include "render/cloth_scene.h"
 #include "render/lights.h"
-#include "render/path_tracer.h"
 #include "render/tone_map.h"
+#include "render/walked_light.h"
 
 namespace heddle {
 namespace {
 
 constexpr double kViewDegrees = 30;
-constexpr double kDistance = 400;  // mm; as good as parallel for swatches of some millimetres
-// The swatch reaches further than the picture, so that no rim is seen or lights it.
-constexpr double kSizeOfPicture = 1.6;
-constexpr double kMarginMm = 4;
+// Light scattered once is the noisiest part, and costs little beside the walk that follows.
+constexpr int kFirstHitSamples = 4;
 
 Light soft(const Vec3& axis, float sharpness, float irradiance) {
   Light light;
@@ -38,29 +36,43 @@ std::vector<Light> lights_of_swatch(bool both_sides) {
 
 }  // namespace
 
-std::vector<Rgb> trace_swatch(const std::shared_ptr<const TileScene>& tile, bool both_sides,
-                              const SwatchView& view, std::uint64_t seed,
-                              const std::function<void(double)>& progress) {
-  const double size = kSizeOfPicture * view.width_mm + kMarginMm;
-  std::vector<ClothPiece> pieces;
-  pieces.push_back({tile, flat_cloth(size, size), !both_sides});
-  const ClothScene scene(std::move(pieces), {});
-  const std::vector<BcsdfTable> materials = scene_materials(scene);
+std::vector<Rgb> trace_swatch(const TileScene& tile, bool both_sides, const SwatchView& view,
+                              std::uint64_t seed, const std::function<void(double)>& progress) {
+  const TileTrace trace(tile);
+  std::vector<BcsdfTable> materials;
+  for (const FiberScattering& fiber : tile.exemplar().scattering) materials.emplace_back(fiber);
   const std::vector<Light> lights = lights_of_swatch(both_sides);
+  const Rgb background = Rgb::Constant(both_sides ? 0.6F : 0.0F);
+  const double tilt = radians(kViewDegrees);
+  const Vec3 eye = Vec3d(0, -std::sin(tilt), std::cos(tilt)).cast<float>();
+  const float start = (tile.exemplar().z_max + 1.0F) / eye.z();
+  const double step = view.width_mm / view.pixels;
 
-  CameraConfig config;
-  config.position =
-      kDistance * Vec3d(0, -std::sin(radians(kViewDegrees)), std::cos(radians(kViewDegrees)));
-  config.fov = 2 * std::atan(0.5 * view.width_mm / kDistance);
-  config.width = config.height = view.pixels;
-  const Camera camera(config);
-  PathTracerSettings settings;
-  settings.seed = seed;
-  const PathTracer tracer(scene, materials, lights, Rgb::Constant(both_sides ? 0.6F : 0.0F),
-                          settings);
-  return trace_picture(tracer, camera, camera.full_frame(), seed,
-                       SampleBudget{.spp = view.spp, .seconds = {}}, progress)
-      .beauty;
+  const auto side = static_cast<std::size_t>(view.pixels);
+  std::vector<Rgb> picture(side * side, Rgb::Zero());
+  for (int sample = 0; sample < view.spp; ++sample) {
+    progress(static_cast<double>(sample) / view.spp);
+    tbb::parallel_for(std::size_t{0}, side, [&](std::size_t row) {
+      for (std::size_t pixel = row * side; pixel < (row + 1) * side; ++pixel) {
+        RandomStream random(seed, RandomStage::kPathTracer, pixel,
+                            static_cast<std::uint64_t>(sample));
+        const double right = static_cast<double>(pixel % side) + random.uniform_double();
+        const double up = static_cast<double>(side - row) - random.uniform_double();
+        const Vec3 on_cloth = Vec3d(right * step, up * step / std::cos(tilt), 0).cast<float>();
+        const auto hit = trace.first(on_cloth + start * eye, -eye);
+        if (!hit) {
+          picture[pixel] += background;
+          continue;
+        }
+        const EyeSample light = walked_light(trace, materials, lights, LightEstimator::kCombined,
+                                             {}, kFirstHitSamples, *hit, eye, random);
+        picture[pixel] += light.single + light.multiple;
+      }
+    });
+  }
+  progress(1);
+  for (Rgb& color : picture) color /= static_cast<float>(view.spp);
+  return picture;
 }
 
 void write_swatch(const std::filesystem::path& path, const std::vector<Rgb>& colors, int pixels) {

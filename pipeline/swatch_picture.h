@@ -5,7 +5,6 @@
 
 #include <filesystem>
 #include <functional>
-#include <memory>
 #include <vector>
 
 #include "fibers/math/vector.h"
@@ -16,14 +15,13 @@ namespace heddle {
 struct SwatchView {
   double width_mm = 0;
   int pixels = 256;
-  int spp = 16;  // even
+  int spp = 8;
 };
 
-/// A flat swatch seen 30 degrees off its normal, on a black table. Cloth that light passes
-/// (both_sides) hangs before a bright sky instead.
-std::vector<Rgb> trace_swatch(const std::shared_ptr<const TileScene>& tile, bool both_sides,
-                              const SwatchView& view, std::uint64_t seed,
-                              const std::function<void(double)>& progress);
+/// Flat cloth without end, seen 30 degrees off its normal, on a black table. Cloth that light
+/// passes (both_sides) hangs before a bright sky instead.
+std::vector<Rgb> trace_swatch(const TileScene& tile, bool both_sides, const SwatchView& view,
+                              std::uint64_t seed, const std::function<void(double)>& progress);
 
 /// Writes colours of pixels x pixels as a PNG, atomically.
 void write_swatch(const std::filesystem::path& path, const std::vector<Rgb>& colors, int pixels);

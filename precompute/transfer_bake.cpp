@@ -82,6 +82,10 @@ TransferBaker::TransferBaker(const TileScene& scene, std::span<const BcsdfTable>
     cell.segment.push_back(s);
     cell.cumulative_openness.push_back(before + origins.openness[s] + kLeastOpenness);
   }
+  for (const CellSegments& cell : cells_) {
+    if (!cell.segment.empty())
+      mean_openness_ += cell.cumulative_openness.back() / static_cast<double>(cells_.size());
+  }
 }
 
 /// What the paths of one batch carried out of the cloth. Paths that stay on a cone fill the rows
@@ -244,6 +248,8 @@ void TransferBaker::store(const CellSums& sums, const CellResult& result) const 
 
 void TransferBaker::bake_cell(std::uint32_t cell, const CellResult& result) const {
   const int n = (settings_.order + 1) * (settings_.order + 1);
+  const double seen = std::min(1.0, cells_[cell].cumulative_openness.back() / mean_openness_);
+  const double allowed = settings_.target_error / std::sqrt(seen);
   Batch batch(n, with_cones());
   CellSums sums(n);
   for (;;) {
@@ -252,8 +258,7 @@ void TransferBaker::bake_cell(std::uint32_t cell, const CellResult& result) cons
     const int paths = sums.batches * kBatch;
     if (sums.batches < kFewestBatches || paths < settings_.min_paths) continue;
     const double brightest = sums.average().row(0).head<3>().maxCoeff();
-    const bool too_noisy =
-        sums.squared_error().mean() > std::pow(settings_.target_error * brightest, 2);
+    const bool too_noisy = sums.squared_error().mean() > std::pow(allowed * brightest, 2);
     if (paths >= settings_.max_paths || !too_noisy) break;
   }
   store(sums, result);

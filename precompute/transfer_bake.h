@@ -16,7 +16,10 @@
 // plain mean includes hidden segments and darkens large cells.
 //
 // Paths come in batches, stratified over w1 and over the cell's segments. The spread of the batch
-// means gives the standard error. A cell is done when its error meets the target. Cells are
+// means gives the standard error. A cell is done when its error meets the target. One that is seen
+// less than the mean cell may have more: the square of its error grows as it is seen less, so that
+// all cells together add no more than twice the target's square to a picture. Else cells deep in
+// white yarns, which no eye meets, take half of the time and more (docs/performance.md). Cells are
 // independent and draw from (seed, cell, path). So any range of cells can be baked alone, by any
 // number of threads, with the same result. Tested in tests/precompute/transfer_bake_test.cpp.
 
@@ -111,6 +114,7 @@ class TransferBaker {
     std::vector<double> cumulative_openness;  // running sum
   };
   std::vector<CellSegments> cells_;  // [cell]
+  double mean_openness_ = 0;         // of a cell: of all its segments together
 };
 
 }  // namespace heddle

@@ -8,7 +8,7 @@
 #include <chrono>
 #include <cmath>
 
-#include "fibers/math/sampling.h"
+#include "render/walked_light.h"
 
 namespace heddle {
 
@@ -24,42 +24,8 @@ PathTracer::PathTracer(const ClothScene& scene, std::span<const BcsdfTable> mate
 
 PathTracer::Sample PathTracer::radiance(const ClothTrace::Vertex& vertex, const Vec3& wo,
                                         RandomStream& random) const {
-  Sample sample;
-  const auto by_shadow_rays = [&](const ClothTrace::Vertex& at, const Mat3& frame, const Vec3& out,
-                                  const Rgb& throughput, int scattering) {
-    if (at.is_end) return false;
-    if (settings_.estimator == LightEstimator::kEscapes) return true;
-    const BcsdfTable& bcsdf = materials_[at.material];
-    const Vec3 local_out = frame.transpose() * out;
-    for (const Light& light : lights_) {
-      const LightSample incoming = sample_light(light, random);
-      const Vec3 local_in = frame.transpose() * incoming.direction;
-      const float cosine = std::sqrt(std::max(0.0F, 1.0F - local_in.x() * local_in.x()));
-      Rgb value =
-          throughput * incoming.weight * bcsdf.evaluate(local_in, local_out) * cosine * at.tint;
-      if (!(value.maxCoeff() > 0)) continue;
-      if (settings_.estimator == LightEstimator::kCombined && !light.is_directional()) {
-        value *= power_heuristic(incoming.pdf, bcsdf.pdf(local_in, local_out, throughput));
-      }
-      if (!trace_.escapes(at, incoming.direction)) continue;
-      (scattering == 1 ? sample.single : sample.multiple) += value;
-    }
-    return true;
-  };
-  const std::optional<PathEscape> escape = walk_path(trace_, materials_, vertex, wo, Rgb(1, 1, 1),
-                                                     random, settings_.limits, by_shadow_rays);
-  if (escape && settings_.estimator != LightEstimator::kShadowRays) {
-    Rgb light_sum = Rgb::Zero();
-    for (const Light& light : lights_) {
-      Rgb incoming = light_radiance(light, escape->direction);
-      if (settings_.estimator == LightEstimator::kCombined) {
-        incoming *= power_heuristic(escape->pdf, light_pdf(light, escape->direction));
-      }
-      light_sum += incoming;
-    }
-    (escape->scatterings == 1 ? sample.single : sample.multiple) += escape->throughput * light_sum;
-  }
-  return sample;
+  return walked_light(trace_, materials_, lights_, settings_.estimator, settings_.limits, 1, vertex,
+                      wo, random);
 }
 
 PathTracer::Sample PathTracer::trace(const EyeRay& ray, RandomStream& random) const {

@@ -10,6 +10,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "fibers/cloth/coarse_fabric.h"
 #include "fibers/cloth/exemplar.h"
 #include "fibers/cloth/weave_config.h"
 
@@ -220,6 +221,8 @@ FabricConfig read_fabric_config(const TomlTable& document) {
     document.fail("yarn", fmt::format("expected at most {} fibers in different colours, found {}",
                                       kMaxMaterials, config.fibers.size()));
   }
+  if (const auto fibers_in_one = document.optional_integer("coarse", 2, 1000))
+    make_coarse(config, static_cast<int>(*fibers_in_one));
   return config;
 }
 

@@ -10,6 +10,10 @@
   sharpness   the same by the light's sharpness, from 1 to 10,000, and directional
   distance    relative RMSE of pixels of a flat swatch by the size of a pixel
   drape       time and error of the methods on draped cloth (table 2)
+  catalogue   the full fabrics: figures as in table 1, times and bytes, and their RMSE on flat cloth
+
+`--full` runs the charts on the full catalogue; without it, all but `catalogue` run on three tiny fabrics. On 2 cores, `--full --only flat,cells,order,drape`
+takes a night.
 
 Needs a Release build. Every JSON says what ran: command, program version, key of the pack, seed, seconds. Measure on an idle machine. The
 default takes about half an hour on 2 cores; --only makes some again.
@@ -27,6 +31,10 @@ import time
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 COLOURS = ["#000000", "#d62728", "#1f77b4", "#2ca02c", "#9467bd", "#ff7f0e", "#8c564b", "#e377c2", "#7f7f7f", "#17becf"]
 VIEWS, LIGHTS = 41, 12
+TINY = ["cotton-tiny", "wool-tiny", "silk-tiny"]
+# The counterparts of table 1 first.
+FULL = ["fleece", "wool-gabardine", "silk-satin", "satin-4-1", "satin-2-3", "satin-1-4", "shot-silk-a", "shot-silk-b",
+        "silk-organza", "cotton-voile", "corduroy", "poplin-stripes", "linen-canvas", "jersey", "rib-1x1", "denim"]
 
 
 class Tools:
@@ -223,6 +231,32 @@ def chart_flat(tools, folder):
     return runs, "RMSE, in brackets the mean over the reference's.\n\n" + "\n".join(table)
 
 
+def chart_catalogue(tools, folder):
+    """One row per full fabric. Times are those that the cache keeps: of the bake that made its data."""
+    runs, groups = [], []
+    table = ["| fabric | segments | radius um | mean free path um | cells | order | MB | visibility core min | transfer core min | "
+             "exact | volume |", "| --- |" + " --- |" * 10]
+    for fabric in tools.options.fabrics:
+        run = tools.flat(fabric)
+        pack, _, _ = tools.pack(fabric)
+        info = json.loads(tools.run([tools.heddle, "info", pack, "--json"])[0])
+        stages = json.loads(tools.run([tools.heddle, "precompute", os.path.join(ROOT, "configs/fabrics", fabric + ".toml"),
+                                       "--cache", tools.options.cache, "--quiet", "--json", "--dry-run"])[0])["forecast"]
+        cloth = json.loads(tools.run([tools.heddle, "info", os.path.join(ROOT, "configs/fabrics", fabric + ".toml"), "--json"])[0])
+        radii = sorted({round(yarn["fiber_radius_um"], 2) for yarn in cloth["yarns"].values()})
+        size = sum(os.path.getsize(os.path.join(pack, name)) for name in os.listdir(pack))
+        minutes = {stage["stage"]: stage["core_seconds"] / 60 for stage in stages}
+        methods = run["methods"]
+        run.update({"info": info, "bytes": size, "core_minutes": minutes, "radius_um": radii})
+        runs.append(run)
+        groups.append((fabric, [(m, *point(0, methods[m])[1:]) for m in ("exact", "volume")]))
+        table.append(f"| {fabric} | {info['segments']:,} | {' to '.join(f'{r:g}' for r in radii)} | {1000 * info['mean_free_path_mm']:.3g} | "
+                     f"{info['cells']:,} | {info['transfer_order']} | {size / 1e6:.0f} | {minutes['maps']:.1f} | {minutes['transfer']:.1f} | "
+                     + " | ".join(f"{100 * methods[m]['rmse']:.1f} % ({methods[m]['mean_ratio']:.2f})" for m in ("exact", "volume")) + " |")
+    svg_bars(f"{folder}/catalogue.svg", "Full fabrics on flat cloth, 41 views x 12 directional lights: RMSE over the mean", groups)
+    return runs, "RMSE of 492 pairs, in brackets the mean over the reference's.\n\n" + "\n".join(table)
+
+
 def sweep(tools, folder, name, title, x_name, settings, log_x):
     """settings: [(x, keyword arguments of Tools.flat)]"""
     runs, curves = [], []
@@ -361,7 +395,8 @@ spp = 16
 
 CHARTS = {"flat": ("Every method on flat cloth", chart_flat), "cells": ("Size of the cells", chart_cells),
           "order": ("Order of the harmonics", chart_order), "sharpness": ("Sharpness of the light", chart_sharpness),
-          "distance": ("View distance", chart_distance), "drape": ("Time and error on draped cloth", chart_drape)}
+          "distance": ("View distance", chart_distance), "drape": ("Time and error on draped cloth", chart_drape),
+          "catalogue": ("The full fabrics", chart_catalogue)}
 
 
 def main():
@@ -369,17 +404,19 @@ def main():
     parser.add_argument("-o", "--output", default=os.path.join(ROOT, "docs/charts"))
     parser.add_argument("--build", default=os.path.join(ROOT, "build/release"))
     parser.add_argument("--cache", default=os.path.join(ROOT, "build/charts-cache"))
-    parser.add_argument("--fabrics", default="cotton-tiny,wool-tiny,silk-tiny")
+    parser.add_argument("--fabrics", help="names, in place of those that a chart takes by itself")
+    parser.add_argument("--full", action="store_true", help="the full catalogue for every chart")
     parser.add_argument("--paths", type=int, default=2000, help="eye rays per view on flat cloth")
-    parser.add_argument("--only", default=",".join(CHARTS))
+    parser.add_argument("--only", default=",".join(name for name in CHARTS if name != "catalogue"))
     options = parser.parse_args()
-    options.fabrics = options.fabrics.split(",")
+    named = options.fabrics.split(",") if options.fabrics else None
     unknown = set(options.only.split(",")) - set(CHARTS)
     if unknown:
         sys.exit(f"no such chart: {', '.join(sorted(unknown))}; expected some of {', '.join(CHARTS)}")
     os.makedirs(options.output, exist_ok=True)
     tools = Tools(options)
     for name in options.only.split(","):
+        options.fabrics = named or (FULL if options.full or name == "catalogue" else TINY)
         runs, text = CHARTS[name][1](tools, options.output)
         document = {"chart": name, "program_version": tools.version, "threads": os.cpu_count(), "paths": options.paths,
                     "text": text, "runs": runs}

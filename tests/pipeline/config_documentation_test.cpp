@@ -188,7 +188,8 @@ TEST(ConfigDocumentation, NamesEveryKeyOfAFabric) {
         "[knit]\nstructure = \"jersey\"\nwales_per_cm = 5\ncourses_per_cm = 7\nwales = 1\n"
         "courses = 2\nsequence = [\"y\"]\n"}) {
     const TomlTable document = TomlTable::parse(
-        "name = \"n\"\nsegment_um = 100\n[fiber.f]\nradius_um = 5\ncolor_r = [0, 0, 0]\n"
+        "name = \"n\"\nsegment_um = 100\ncoarse = 2\n[fiber.f]\nradius_um = 5\ncolor_r = [0, 0, "
+        "0]\n"
         "color_tt = [0, 0, 0]\nbeta_r_deg = 5\nbeta_tt_deg = 5\ngamma_tt_deg = 9\n" +
             yarn + cloth,
         (folder.path() / "fabric.toml").string());

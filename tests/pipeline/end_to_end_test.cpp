@@ -864,7 +864,7 @@ TEST(RenderEndToEnd, WithinTheToleranceFromWhatWasPlanned) {
   store_table(shop, 0.75);
   // Large enough that rendering, not setting up, is what pictures cost.
   std::string scene = kSmallScene;
-  scene.replace(scene.find("[24, 24]"), 8, "[56, 56]");
+  scene.replace(scene.find("[24, 24]"), 8, "[96, 96]");
   std::ofstream(shop / "scene.toml") << scene;
   // Of many pictures, so that no other work on the machine makes paths the cheaper way.
   const Json report = shop.report(
@@ -886,7 +886,7 @@ TEST(RenderEndToEnd, WithinTheToleranceFromWhatWasPlanned) {
     ADD_FAILURE() << "the table says that paths are dear: " << report.at("plan").dump(1);
   }
   ASSERT_EQ(shop.run({"render", "scene.toml", "-o", "reference.exr", "--method", "path", "--spp",
-                      "64", "--seed", "77"})
+                      "32", "--seed", "77"})
                 .status,
             0);
   const Json error = shop.report({"compare", "out.exr", "reference.exr"});

@@ -19,7 +19,7 @@ TEST(SwatchPicture, WhiteClothIsWhite) {
   const auto tile = std::make_shared<const TileScene>(
       test::straight_fibers(1, 1, places, 0.048F, 10, test::white_fiber()));
   const std::vector<Rgb> picture =
-      trace_swatch(tile, false, {.width_mm = 1, .pixels = 16, .spp = 16}, 1, [](double) {});
+      trace_swatch(*tile, false, {.width_mm = 1, .pixels = 16, .spp = 16}, 1, [](double) {});
   Rgb mean = Rgb::Zero();
   for (const Rgb& color : picture) mean += color / static_cast<float>(picture.size());
   EXPECT_GT(mean.minCoeff(), 0.4F);
