@@ -1,11 +1,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
+#include "fibers/baked/transfer.h"
 #include "fibers/cloth/synthesize.h"
 #include "fibers/tracing/tile_scene.h"
 #include "formats/atomic_file.h"
@@ -48,25 +50,77 @@ constexpr PaperFabric kPaper[] = {
     {"shot-silk-b", "Shot Silk B", 1.0, 5, 7.18, 9.43},
 };
 
-std::string paper_cells(const std::string& file) {
-  for (const PaperFabric& fabric : kPaper) {
-    if (file != fabric.file) continue;
-    return fmt::format(
-        "{}: radius {} um, order {}, visibility {} min, transfer {} min on 192 cores", fabric.name,
-        fabric.radius_um, fabric.order, fabric.visibility_minutes, fabric.transfer_minutes);
-  }
-  return "";
+const PaperFabric* paper_counterpart(const std::string& file) {
+  const auto* const end = std::end(kPaper);
+  const auto* const found = std::find_if(
+      std::begin(kPaper), end, [&](const PaperFabric& fabric) { return file == fabric.file; });
+  return found == end ? nullptr : found;
 }
 
-/// Bytes and processor minutes of the fabric's stages, as far as the cache holds them.
-std::string baked_cells(FabricStages& stages, const Cache& cache) {
-  std::string text;
+constexpr double kPaperCores = 192;
+constexpr const char* kColumns[] = {
+    "segments", "fiber radius, um",     "mean free path, um", "cells", "order",
+    "MB",       "visibility, core min", "transfer, core min"};
+using Cells = std::array<std::string, std::size(kColumns)>;
+
+std::string summary_row(const std::string& name, const char* style, const Cells& cells) {
+  std::string row = fmt::format("<tr class=\"{}\"><th>{}</th>", style, xml_text(name));
+  for (const std::string& cell : cells) row += fmt::format("<td>{}</td>", cell);
+  return row + "</tr>\n";
+}
+
+/// A row of the table at the top: what the fabric is, and what its data took as far as the cache
+/// holds them. Below it, its counterpart of table 1.
+std::string summary_of(FabricStages& stages, const TileScene& tile, const Cache& cache) {
+  const FabricConfig& config = stages.document().config;
+  const auto [thinnest, thickest] =
+      std::minmax_element(tile.exemplar().radius_mm.begin(), tile.exemplar().radius_mm.end());
+  Cells cells;
+  cells[0] = fmt::format("{}", tile.exemplar().segment_count());
+  cells[1] = *thinnest == *thickest
+                 ? fmt::format("{:.3g}", 1000 * *thinnest)
+                 : fmt::format("{:.3g} to {:.3g}", 1000 * *thinnest, 1000 * *thickest);
+  cells[2] = fmt::format("{:.3g}", 1000 * tile.mean_free_path(config.seed, kMeanFreePathSamples));
+  double bytes = 0;
+  double visibility = 0;
+  bool whole = true;
   for (const StageCost& cost : stages.costs(kEverything)) {
-    if (!cost.present || cost.seconds < 0) continue;
     const char* extension = cost.stage == "voxelize" ? ".vdb" : ".safetensors";
     const fs::path path = cache.artifact(cost.stage, cost.key, extension);
-    text += fmt::format("{}{}: {:.3g} MB, {:.3g} core min", text.empty() ? "" : "; ", cost.stage,
-                        static_cast<double>(fs::file_size(path)) * 1e-6, cost.core_seconds / 60);
+    whole = whole && cost.present && cost.seconds >= 0;
+    if (!whole) break;
+    if (cost.stage != "maps") bytes += static_cast<double>(fs::file_size(path));
+    if (cost.stage == "transfer") {
+      const Transfer transfer = read_transfer(path);
+      cells[3] = fmt::format("{}", transfer.cell_count());
+      cells[4] = fmt::format("{}", transfer.order);
+      cells[7] = fmt::format("{:.1f}", cost.core_seconds / 60);
+    } else if (cost.stage == "maps" || cost.stage == "ssdf" || cost.stage == "sg") {
+      visibility += cost.core_seconds / 60;
+    }
+  }
+  if (whole) {
+    cells[5] = fmt::format("{:.0f}", bytes * 1e-6);
+    cells[6] = fmt::format("{:.1f}", visibility);
+  }
+  std::string rows = summary_row(config.name, "ours", cells);
+  if (const PaperFabric* paper = paper_counterpart(stages.document().file.stem().string())) {
+    rows += summary_row(
+        fmt::format("{}, Khungurn et al. 2017", paper->name), "paper",
+        {"", fmt::format("{:g}", paper->radius_um), "", "", fmt::format("{}", paper->order), "",
+         fmt::format("{:.0f}", kPaperCores * paper->visibility_minutes),
+         fmt::format("{:.0f}", kPaperCores * paper->transfer_minutes)});
+  }
+  return rows;
+}
+
+std::string text_of(const Report& value) {
+  if (value.is_string()) return value.get<std::string>();
+  if (!value.is_structured()) return value.dump();
+  std::string text;
+  for (const auto& [key, part] : value.items()) {
+    text += text.empty() ? "" : ", ";
+    text += (value.is_object() ? key + ": " : "") + text_of(part);
   }
   return text;
 }
@@ -75,16 +129,27 @@ std::string rows_of(const Report& report) {
   std::string rows;
   for (const auto& [key, value] : report.items()) {
     if (key == "kind" || key == "tile_repeats" || key == "ray_tracing_bytes") continue;
+    if (value.is_array() && value.empty()) continue;
     std::string name = key;
     std::replace(name.begin(), name.end(), '_', ' ');
-    rows += fmt::format("<tr><td>{}</td><td>{}</td></tr>\n", xml_text(name),
-                        xml_text(value.is_string() ? value.get<std::string>() : value.dump()));
+    std::string text = xml_text(text_of(value));
+    if (key == "drawing") {
+      text = "<pre>";
+      for (const Report& line : value) text += xml_text(line.get<std::string>()) + "\n";
+      text += "</pre>";
+    }
+    rows += fmt::format("<tr><td>{}</td><td>{}</td></tr>\n", xml_text(name), text);
   }
   return rows;
 }
 
+struct Section {
+  std::string summary;  // rows of the table at the top
+  std::string body;
+};
+
 /// Pictures and figures of one fabric; the pictures go into the folder.
-std::string section_of(const fs::path& fabric, const CatalogueOptions& options, Job& job) {
+Section section_of(const fs::path& fabric, const CatalogueOptions& options, Job& job) {
   FabricStages stages(fabric, job.context());
   const FabricConfig& config = stages.document().config;
   const std::string file = fabric.stem().string();
@@ -105,12 +170,10 @@ std::string section_of(const fs::path& fabric, const CatalogueOptions& options, 
         "</figure>\n",
         xml_text(name), width);
   }
-  Report report = fabric_report(stages.document(), tile.get());
-  if (const std::string baked = baked_cells(stages, job.context().cache); !baked.empty())
-    report["data"] = baked;
-  if (const std::string paper = paper_cells(file); !paper.empty()) report["table 1"] = paper;
-  return fmt::format("<section><h2>{}</h2>\n<div>{}<table>{}</table></div></section>\n",
-                     xml_text(config.name), figures, rows_of(report));
+  const Report report = fabric_report(stages.document(), tile.get());
+  return {summary_of(stages, *tile, job.context().cache),
+          fmt::format("<section><h2>{}</h2>\n<div>{}<table>{}</table></div></section>\n",
+                      xml_text(config.name), figures, rows_of(report))};
 }
 
 constexpr char kPage[] = R"(<!DOCTYPE html>
@@ -120,9 +183,14 @@ body {{ font: 14px/1.45 system-ui, 'DejaVu Sans', Arial, sans-serif; color: #222
 section div {{ display: flex; flex-wrap: wrap; gap: 1em; align-items: flex-start; }}
 figure {{ margin: 0; }} figcaption {{ color: #555; }}
 table {{ font-size: .85em; max-width: 640px; }} td {{ padding: 0 .9em .1em 0; vertical-align: top; overflow-wrap: anywhere; }}
-td:first-child {{ color: #666; white-space: nowrap; }}
+section td:first-child {{ color: #666; white-space: nowrap; }}
+pre {{ line-height: 1; margin: 0; }} .summary {{ max-width: none; }} .summary th {{ text-align: left; font-weight: normal; padding-right: .9em; }}
+.paper {{ color: #888; }} .summary .ours > th {{ font-weight: 600; }}
 </style></head><body>
 <h1>Fabrics</h1>
+<table class="summary"><tr><th></th>{}</tr>
+{}</table>
+<p>Data that were not baked leave their places empty. Table 1 counts minutes on 192 cores.</p>
 {}</body></html>
 )";
 
@@ -147,10 +215,16 @@ int swatch_command(const SwatchOptions& options, const CommonOptions& common) {
 int catalogue_command(const CatalogueOptions& options, const CommonOptions& common) {
   Job job(common);
   make_folder(options.output);
-  std::string sections;
-  for (const fs::path& fabric : options.fabrics) sections += section_of(fabric, options, job);
+  std::string names;
+  for (const char* column : kColumns) names += fmt::format("<th>{}</th>", column);
+  Section page_of_all;
+  for (const fs::path& fabric : options.fabrics) {
+    const Section one = section_of(fabric, options, job);
+    page_of_all.summary += one.summary;
+    page_of_all.body += one.body;
+  }
   const fs::path page = options.output / "index.html";
-  const std::string html = fmt::format(kPage, sections);
+  const std::string html = fmt::format(kPage, names, page_of_all.summary, page_of_all.body);
   write_file_atomically(page, html);
   job.add_artifact(page);
   job.finish();

@@ -44,7 +44,7 @@ struct SwatchOptions {
   std::filesystem::path output;  // .png
   double width_mm = 4;
   int pixels = 256;
-  int spp = 8;
+  int spp = 16;
 };
 /// A path-traced picture of a fabric, without a scene (swatch_picture.h).
 int swatch_command(const SwatchOptions& options, const CommonOptions& common);
@@ -53,7 +53,7 @@ struct CatalogueOptions {
   std::vector<std::filesystem::path> fabrics;
   std::filesystem::path output;  // folder
   int pixels = 256;
-  int spp = 16;
+  int spp = 32;
 };
 /// Writes index.html in `output`: of every fabric pictures near and far, its figures, and those of
 /// its data as far as the cache holds them, beside table 1 of Khungurn et al. 2017. Builds the

@@ -228,8 +228,7 @@ void add_picture_size(CLI::App& command, int& pixels, int& spp) {
       .add_option("--pixels", pixels,
                   "Along each side of a picture; " + std::to_string(pixels) + " by default")
       ->check(CLI::Range(1, 4096));
-  command
-      .add_option("--spp", spp, "Samples per pixel; " + std::to_string(spp) + " by default")
+  command.add_option("--spp", spp, "Samples per pixel; " + std::to_string(spp) + " by default")
       ->check(CLI::Range(2, 1 << 20));
 }
 

@@ -15,7 +15,7 @@ namespace heddle {
 struct SwatchView {
   double width_mm = 0;
   int pixels = 256;
-  int spp = 8;
+  int spp = 16;
 };
 
 /// Flat cloth without end, seen 30 degrees off its normal, on a black table. Cloth that light

@@ -24,7 +24,7 @@ PathTracer::PathTracer(const ClothScene& scene, std::span<const BcsdfTable> mate
 
 PathTracer::Sample PathTracer::radiance(const ClothTrace::Vertex& vertex, const Vec3& wo,
                                         RandomStream& random) const {
-  return walked_light(trace_, materials_, lights_, settings_.estimator, settings_.limits, 1, vertex,
+  return walked_light(trace_, materials_, lights_, settings_.estimator, settings_.limits, vertex,
                       wo, random);
 }
 

@@ -19,12 +19,11 @@ namespace heddle {
 
 /// Light that leaves `vertex` towards `wo`. A Trace of path_walk.h, which also answers
 /// `escapes(vertex, direction)`. A Vertex may have `is_end`: the path brings nothing from there.
-/// `first_hit_samples`: shadow rays towards each light at the first vertex; at later ones, one.
 template <class Trace>
 EyeSample walked_light(const Trace& trace, std::span<const BcsdfTable> materials,
                        std::span<const Light> lights, LightEstimator estimator,
-                       const WalkLimits& limits, int first_hit_samples,
-                       const typename Trace::Vertex& vertex, const Vec3& wo, RandomStream& random) {
+                       const WalkLimits& limits, const typename Trace::Vertex& vertex,
+                       const Vec3& wo, RandomStream& random) {
   EyeSample sample;
   const auto by_shadow_rays = [&](const auto& at, const Mat3& frame, const Vec3& out,
                                   const Rgb& throughput, int scattering) {
@@ -34,34 +33,28 @@ EyeSample walked_light(const Trace& trace, std::span<const BcsdfTable> materials
     if (estimator == LightEstimator::kEscapes) return true;
     const BcsdfTable& bcsdf = materials[at.material];
     const Vec3 local_out = frame.transpose() * out;
-    const int count = scattering == 1 ? first_hit_samples : 1;
     for (const Light& light : lights) {
-      for (int k = 0; k < count; ++k) {
-        const LightSample incoming = sample_light(light, random);
-        const Vec3 local_in = frame.transpose() * incoming.direction;
-        const float cosine = std::sqrt(std::max(0.0F, 1.0F - local_in.x() * local_in.x()));
-        Rgb value = throughput * incoming.weight * bcsdf.evaluate(local_in, local_out) * cosine;
-        if constexpr (requires { at.tint; }) value *= at.tint;
-        if (!(value.maxCoeff() > 0)) continue;
-        if (estimator == LightEstimator::kCombined && !light.is_directional()) {
-          value *= power_heuristic(static_cast<float>(count) * incoming.pdf,
-                                   bcsdf.pdf(local_in, local_out, throughput));
-        }
-        if (!trace.escapes(at, incoming.direction)) continue;
-        (scattering == 1 ? sample.single : sample.multiple) += value / static_cast<float>(count);
-      }
+      const LightSample incoming = sample_light(light, random);
+      const Vec3 local_in = frame.transpose() * incoming.direction;
+      const float cosine = std::sqrt(std::max(0.0F, 1.0F - local_in.x() * local_in.x()));
+      Rgb value = throughput * incoming.weight * bcsdf.evaluate(local_in, local_out) * cosine;
+      if constexpr (requires { at.tint; }) value *= at.tint;
+      if (!(value.maxCoeff() > 0)) continue;
+      if (estimator == LightEstimator::kCombined && !light.is_directional())
+        value *= power_heuristic(incoming.pdf, bcsdf.pdf(local_in, local_out, throughput));
+      if (!trace.escapes(at, incoming.direction)) continue;
+      (scattering == 1 ? sample.single : sample.multiple) += value;
     }
     return true;
   };
   const std::optional<PathEscape> escape =
       walk_path(trace, materials, vertex, wo, Rgb(1, 1, 1), random, limits, by_shadow_rays);
   if (!escape || estimator == LightEstimator::kShadowRays) return sample;
-  const auto count = static_cast<float>(escape->scatterings == 1 ? first_hit_samples : 1);
   Rgb light_sum = Rgb::Zero();
   for (const Light& light : lights) {
     Rgb incoming = light_radiance(light, escape->direction);
     if (estimator == LightEstimator::kCombined)
-      incoming *= power_heuristic(escape->pdf, count * light_pdf(light, escape->direction));
+      incoming *= power_heuristic(escape->pdf, light_pdf(light, escape->direction));
     light_sum += incoming;
   }
   (escape->scatterings == 1 ? sample.single : sample.multiple) += escape->throughput * light_sum;
