@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -153,8 +152,8 @@ Section section_of(const fs::path& fabric, const CatalogueOptions& options, Job&
   FabricStages stages(fabric, job.context());
   const FabricConfig& config = stages.document().config;
   const std::string file = fabric.stem().string();
-  const auto tile = std::make_shared<const TileScene>(read_exemplar(stages.synth().path));
-  const double shorter = std::min(tile->exemplar().width_mm, tile->exemplar().height_mm);
+  const TileScene tile(read_exemplar(stages.synth().path));
+  const double shorter = std::min(tile.exemplar().width_mm, tile.exemplar().height_mm);
   const double near = std::min(kNearRepeats * shorter, kNearMm);
   std::string figures;
   for (const double width : {near, kFarOfNear * near}) {
@@ -162,7 +161,7 @@ Section section_of(const fs::path& fabric, const CatalogueOptions& options, Job&
     Progress progress(job.console(), name, "%", 100);
     write_swatch(
         options.output / name,
-        trace_swatch(*tile, config.light_from_both_sides, {width, options.pixels, options.spp},
+        trace_swatch(tile, config.light_from_both_sides, {width, options.pixels, options.spp},
                      config.seed, percent_of(progress)),
         options.pixels);
     figures += fmt::format(
@@ -170,8 +169,8 @@ Section section_of(const fs::path& fabric, const CatalogueOptions& options, Job&
         "</figure>\n",
         xml_text(name), width);
   }
-  const Report report = fabric_report(stages.document(), tile.get());
-  return {summary_of(stages, *tile, job.context().cache),
+  const Report report = fabric_report(stages.document(), &tile);
+  return {summary_of(stages, tile, job.context().cache),
           fmt::format("<section><h2>{}</h2>\n<div>{}<table>{}</table></div></section>\n",
                       xml_text(config.name), figures, rows_of(report))};
 }
@@ -200,10 +199,10 @@ int swatch_command(const SwatchOptions& options, const CommonOptions& common) {
   Job job(common);
   require_writable(options.output);
   FabricStages stages(options.fabric, job.context());
-  const auto tile = std::make_shared<const TileScene>(read_exemplar(stages.synth().path));
+  const TileScene tile(read_exemplar(stages.synth().path));
   Progress progress(job.console(), "swatch", "%", 100);
   write_swatch(options.output,
-               trace_swatch(*tile, stages.document().config.light_from_both_sides,
+               trace_swatch(tile, stages.document().config.light_from_both_sides,
                             {options.width_mm, options.pixels, options.spp},
                             stages.document().config.seed, percent_of(progress)),
                options.pixels);

@@ -14,6 +14,7 @@ namespace heddle {
 namespace {
 
 constexpr double kViewDegrees = 30;
+
 Light soft(const Vec3& axis, float sharpness, float irradiance) {
   Light light;
   light.axis = axis.normalized();

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cassert>
 #include <chrono>
-#include <cmath>
 
 #include "render/walked_light.h"
 

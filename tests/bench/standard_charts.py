@@ -234,7 +234,7 @@ def chart_flat(tools, folder):
 def chart_catalogue(tools, folder):
     """One row per full fabric. Times are those that the cache keeps: of the bake that made its data."""
     runs, groups = [], []
-    table = ["| fabric | segments | radius um | mean free path um | cells | order | MB | visibility core min | transfer core min | "
+    table = ["| fabric | segments | radius um | mean free path um | cells | order | MB | maps core min | transfer core min | "
              "exact | volume |", "| --- |" + " --- |" * 10]
     for fabric in tools.options.fabrics:
         run = tools.flat(fabric)
