@@ -34,6 +34,14 @@ std::optional<BlockLayout> block_layout(const ClothConfig& cloth,
           "{}: blocks of {} x {} repeats do not divide the tile of {}, which has {} x {}", scene,
           size[0], size[1], fabric->name, fabric->repeats_x, fabric->repeats_y));
     }
+    const auto [fit_x, fit_y] = fabric->fitting_blocks;
+    if (layout.order == BlockOrder::kScattered && fit_x > 0 &&
+        (size[0] % fit_x != 0 || size[1] % fit_y != 0)) {
+      throw ConfigError(fmt::format(
+          "{}: scattered blocks of {} x {} repeats would not fit each other: those of {} that do "
+          "have {} x {} (fitting_repeats)",
+          scene, size[0], size[1], fabric->name, fit_x, fit_y));
+    }
     layout.tile_blocks.push_back({fabric->repeats_x / size[0], fabric->repeats_y / size[1]});
     const double width = size[0] * fabric->weave.ends * fabric->warp.spacing_mm;
     const double height = size[1] * fabric->weave.picks * fabric->weft.spacing_mm;

@@ -154,6 +154,46 @@ ThreadSystem read_system(const TomlTable& document, const SystemKeys& keys, Fabr
   return system;
 }
 
+/// Blocks that fit: whole numbers of them in the tile, and of sequences in each.
+void read_fitting_blocks(const TomlTable& weave, FabricConfig& config) {
+  struct Along {
+    const char* key;
+    const char* repeats;
+    int repeat_count;
+    int of_weave;
+    const ThreadSystem& system;
+  };
+  const Along alongs[] = {
+      {"fitting_repeats_x", "repeats_x", config.repeats_x, config.weave.ends, config.warp},
+      {"fitting_repeats_y", "repeats_y", config.repeats_y, config.weave.picks, config.weft}};
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    const Along& along = alongs[axis];
+    const std::optional<std::int64_t> size = weave.optional_integer(along.key, 1, 64);
+    if (size.has_value() != weave.has(alongs[1 - axis].key)) {
+      weave.fail(size ? along.key : alongs[1 - axis].key,
+                 "expected both or none of fitting_repeats_x and fitting_repeats_y");
+    }
+    if (!size) continue;
+    const int own = static_cast<int>(*size);
+    if (along.repeat_count % own != 0) {
+      weave.fail(along.key, fmt::format("expected a divisor of {}, which is {}", along.repeats,
+                                        along.repeat_count));
+    }
+    const std::size_t sequence = along.system.sequence.size();
+    if (static_cast<std::size_t>(own * along.of_weave) % sequence != 0) {
+      weave.fail(along.key, fmt::format("expected a multiple of {}: blocks hold whole sequences",
+                                        fitting_repeats(along.of_weave, sequence)));
+    }
+    for (const int k : along.system.sequence) {
+      if (config.yarn(k).slubs.empty()) continue;
+      weave.fail(along.key, fmt::format("expected no slubs: those of the yarn \"{}\" would end at "
+                                        "the blocks' borders",
+                                        config.yarn(k).name));
+    }
+    config.fitting_blocks[axis] = own;
+  }
+}
+
 void read_woven(const TomlTable& document, FabricConfig& config) {
   const TomlTable weave = document.table("weave");
   config.weave = read_weave(weave);
@@ -164,6 +204,7 @@ void read_woven(const TomlTable& document, FabricConfig& config) {
       read_system(document, {"warp", "repeats_x", config.weave.ends, config.repeats_x}, config);
   config.weft =
       read_system(document, {"weft", "repeats_y", config.weave.picks, config.repeats_y}, config);
+  read_fitting_blocks(weave, config);
 }
 
 void read_found(const TomlTable& table, FabricConfig& config) {
@@ -215,6 +256,9 @@ FabricConfig read_fabric_config(const TomlTable& document) {
   }
   if (const auto pile = document.optional_table("pile")) {
     config.pile = read_pile(*pile);
+    if (config.fitting_blocks[0] > 0)
+      document.table("weave").fail("fitting_repeats_x",
+                                   "expected no [pile]: it would jump at the blocks' borders");
     config.pile->fiber = find_fiber(*pile, config.fibers);
   }
   if (config.fibers.size() > kMaxMaterials) {

@@ -4,6 +4,7 @@
 // configs/README.md. Lengths in millimetres, angles in radians after parsing. Tested in
 // tests/fibers/cloth/fabric_config_test.cpp.
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -34,6 +35,8 @@ struct FabricConfig {
   // weave repeats in the tile along the weft (x) and along the warp (y)
   int repeats_x = 1;
   int repeats_y = 1;
+  // Weave repeats along weft and warp in the blocks of the tile that fit each other; 0: none need.
+  std::array<int, 2> fitting_blocks = {0, 0};
   // share of the pull that the weft takes, 0 .. 1, and thus of the crimp that the warp takes
   double crimp_warp = 0.5;
   double segment_mm = 0;  // target length of a fiber segment

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <set>
 #include <stdexcept>
 #include <utility>
@@ -39,6 +40,10 @@ constexpr int kMostSegmentsPerFiber = 1 << 16;
 
 // A loop rises above its fiber by at least this factor (the published generator's).
 constexpr double kLeastLift = 1.05;
+
+// Where blocks must fit, a loop lies within one. Its top is at least this share of a block away
+// from borders.
+constexpr double kLeastRoomOfLoop = 0.2;
 
 // Draws of a fiber for a loop of a given height, before there is taken to be none.
 constexpr int kLoopDraws = 10000;
@@ -105,6 +110,7 @@ struct FiberOfPly {
   Vec2d place;  // in the ply's unit disc, where the fiber's twist starts and migration is nil
   double migration_phase;
   WanderModes wander_side, wander_up;
+  std::optional<FittingFiber> fitting;
 };
 
 struct Loop {
@@ -116,7 +122,8 @@ struct Loop {
 class FibersOfYarn {
  public:
   FibersOfYarn(const YarnConfig& yarn, double fiber_radius_mm, const CentreLine& line,
-               double segment_mm, std::uint64_t seed, std::uint32_t yarn_index, Exemplar& exemplar)
+               double segment_mm, std::uint64_t seed, std::uint32_t yarn_index,
+               const BlocksOfYarn& blocks, Exemplar& exemplar)
       : yarn_(yarn),
         fiber_radius_(fiber_radius_mm),
         line_(line),
@@ -124,7 +131,10 @@ class FibersOfYarn {
         seed_(seed),
         index_(yarn_index),
         exemplar_(exemplar),
-        twist_(snap_twist(yarn, line.length_mm)),
+        twist_(snap_twist(yarn, line.length_mm, blocks.count)),
+        segments_(
+            static_cast<int>(segments_per_fiber(yarn, line.length_mm, segment_mm, blocks.count))),
+        blocks_(blocks),
         // once per turn of the ply, unless asked otherwise
         migration_waves_(
             std::max(1.0, std::round(yarn.migration_per_turn * std::abs(twist_.ply_turns)))),
@@ -135,12 +145,19 @@ class FibersOfYarn {
       for (double* length : {&shape_.centre, &shape_.radial, &shape_.tangential})
         *length /= round_radius_;
     }
+    if (blocks.count > 0) {
+      fitting_.emplace(
+          yarn, blocks,
+          FittingFibers::Setup{fiber_radius_, line.length_mm, segments_, twist_.yarn_turns,
+                               twist_.ply_turns, migration_waves_, seed, yarn_index});
+      migration_waves_ = fitting_->migration_waves();
+    }
     RandomStream slubs = stream_of(seed, yarn_index, YarnStream::kSlubs, 0);
     thickness_ = ThicknessProfile(yarn.slubs, line.length_mm, slubs);
   }
 
   void add_all() {
-    RandomStream random(seed_, RandomStage::kSynth, index_, 0);
+    RandomStream random(seed_, RandomStage::kSynth, fitting_ ? blocks_.pattern_yarn : index_, 0);
     const double yarn_phase = kTurn * random.uniform_double();
     for (int ply = 0; ply < yarn_.plies; ++ply)
       ply_phase_.push_back(yarn_phase + kTurn * ply / yarn_.plies);
@@ -157,6 +174,11 @@ class FibersOfYarn {
   // The fibers of a ply start as a sunflower pattern, jittered, whose radii are moved to the ply's
   // density.
   FiberOfPly fiber_in_pattern(int ply, int i, double pattern_phase) const {
+    if (fitting_) {
+      FittingFiber fitting = fitting_->fiber(ply, i);
+      const Vec2d place = with_density(fitting.place);
+      return {ply, place, fitting.migration_phase, {}, {}, std::move(fitting)};
+    }
     const double golden_angle = kPi * (3 - std::sqrt(5.0));
     RandomStream random(seed_, RandomStage::kSynth, index_,
                         1 + static_cast<std::uint64_t>(ply * yarn_.fibers_per_ply + i));
@@ -168,13 +190,18 @@ class FibersOfYarn {
     return fiber_at(ply, place, random);
   }
 
-  // `even`: a place in the unit disc in which fibers lie evenly.
-  FiberOfPly fiber_at(int ply, Vec2d even, RandomStream& random) const {
+  // From a unit disc in which fibers lie evenly to the ply's.
+  Vec2d with_density(Vec2d even) const {
     const double norm = std::min(1.0, even.norm());
     if (norm > 0) even *= places_.radius(norm * norm) / even.norm();
+    return even;
+  }
+
+  // `even`: a place in the unit disc in which fibers lie evenly.
+  FiberOfPly fiber_at(int ply, Vec2d even, RandomStream& random) const {
     // A slope of s along each of the two cross axes tilts the fiber by atan(sqrt(2) s).
     const double slope_rms = std::tan(yarn_.wander_rms) / std::sqrt(2.0);
-    FiberOfPly fiber{ply, even, kTurn * random.uniform_double(), {}, {}};
+    FiberOfPly fiber{ply, with_density(even), kTurn * random.uniform_double(), {}, {}, {}};
     fiber.wander_side = wander_modes(slope_rms, line_.length_mm, fiber_radius_, random);
     fiber.wander_up = wander_modes(slope_rms, line_.length_mm, fiber_radius_, random);
     return fiber;
@@ -183,10 +210,14 @@ class FibersOfYarn {
   // R(s) = R (1 - m (1 - cos(waves s + phase)) / 2), m = 1 - rho_min (Zhao et al. 2016, equation
   // 4).
   Vec2d in_ply(const FiberOfPly& fiber, double share) const {
-    const double squeeze =
-        1 - 0.5 * yarn_.migration *
-                (1 - std::cos(kTurn * migration_waves_ * share + fiber.migration_phase));
-    const Vec2d place = squeeze * turned(fiber.place, kTurn * twist_.ply_turns * share);
+    double phase = kTurn * migration_waves_ * share + fiber.migration_phase;
+    double angle = kTurn * twist_.ply_turns * share;
+    if (fitting_) {
+      phase = fitting_->migration_phase(*fiber.fitting, share);
+      angle = kTurn * fitting_->turns(*fiber.fitting, share);
+    }
+    const double squeeze = 1 - 0.5 * yarn_.migration * (1 - std::cos(phase));
+    const Vec2d place = squeeze * turned(fiber.place, angle);
     return {shape_.radial * place.x(), shape_.tangential * place.y()};
   }
 
@@ -212,8 +243,11 @@ class FibersOfYarn {
     Vec2d place = in_yarn(fiber.ply, share, beside);
     const YarnPlace yarn = place_along(line_, share);
     if (yarn_.wander_rms > 0) {
-      place.x() += wander_at(fiber.wander_side, share) / (yarn.half_width_mm - fiber_radius_);
-      place.y() += wander_at(fiber.wander_up, share) / (yarn.half_height_mm - fiber_radius_);
+      const Vec2d wander =
+          fitting_ ? fitting_->wander_mm(*fiber.fitting, share)
+                   : Vec2d(wander_at(fiber.wander_side, share), wander_at(fiber.wander_up, share));
+      place.x() += wander.x() / (yarn.half_width_mm - fiber_radius_);
+      place.y() += wander.y() / (yarn.half_height_mm - fiber_radius_);
     }
     place /= std::max(1.0, place.norm());
     if (loop != nullptr) {
@@ -232,10 +266,9 @@ class FibersOfYarn {
     for (int i = 0; i < yarn_.fibers_per_ply; ++i)
       fibers.push_back(fiber_in_pattern(ply, i, pattern_phase));
     const auto loops = draw_loops(ply, fibers);
-    const int segments = static_cast<int>(segments_per_fiber(yarn_, line_.length_mm, segment_mm_));
     for (std::size_t i = 0; i < fibers.size(); ++i) {
-      for (int k = 0; k <= segments; ++k) {
-        const double share = static_cast<double>(k) / segments;
+      for (int k = 0; k <= segments_; ++k) {
+        const double share = static_cast<double>(k) / segments_;
         const Loop* nearest = nullptr;
         for (const Loop& loop : loops[i]) {
           const double apart = share - loop.centre_share;
@@ -256,16 +289,22 @@ class FibersOfYarn {
     const auto waves = static_cast<std::uint32_t>(migration_waves_);
     std::set<std::pair<std::uint32_t, std::uint32_t>> taken;
     const auto draw = [&](double height) {
-      for (int k = 0; k < kLoopDraws; ++k) {
+      for (int k = 0; waves > 0 && k < kLoopDraws; ++k) {
         const std::uint32_t f = random.index(fibers.size());
         const std::uint32_t wave = random.index(waves);
         // The outer turn, where the phase of the migration is whole.
         double centre = (wave - fibers[f].migration_phase / kTurn) / migration_waves_;
         centre -= std::floor(centre);
         const double radius = round_radius_ * in_ply(fibers[f], centre).norm();
-        if (kLeastLift * radius > height || radius <= 0 || !taken.insert({f, wave}).second)
-          continue;
-        loops[f].push_back({centre, 0.5 / migration_waves_, height / radius});
+        if (kLeastLift * radius > height || radius <= 0) continue;
+        double half = 0.5 / migration_waves_;
+        if (fitting_) {  // within a block
+          const double room = fitting_->distance_to_border(centre) - 1.0 / segments_;
+          if (room < kLeastRoomOfLoop / blocks_.count) continue;
+          half = std::min(half, room);
+        }
+        if (!taken.insert({f, wave}).second) continue;
+        loops[f].push_back({centre, half, height / radius});
         return true;
       }
       return false;
@@ -394,29 +433,37 @@ class FibersOfYarn {
   std::uint32_t index_;
   Exemplar& exemplar_;
   SnappedTwist twist_;
+  int segments_;  // of each fiber
+  BlocksOfYarn blocks_;
   double migration_waves_;  // whole waves per period
   double round_radius_;     // mm
   RadialPlaces places_;
   PlyShape shape_;  // in the yarn's unit disc
   ThicknessProfile thickness_;
   std::vector<double> ply_phase_;
+  std::optional<FittingFibers> fitting_;  // where blocks must fit
 };
 
 }  // namespace
 
-SnappedTwist snap_twist(const YarnConfig& yarn, double period_mm) {
-  return {static_cast<int>(std::lround(yarn.yarn_turns_per_mm * period_mm)),
+SnappedTwist snap_twist(const YarnConfig& yarn, double period_mm, int blocks) {
+  const double yarn_turns = yarn.yarn_turns_per_mm * period_mm;
+  return {blocks > 0 ? fitting_yarn_turns(yarn_turns, yarn.plies, blocks)
+                     : static_cast<int>(std::lround(yarn_turns)),
           static_cast<int>(std::lround(yarn.ply_turns_per_mm * period_mm))};
 }
 
-double segments_per_fiber(const YarnConfig& yarn, double period_mm, double segment_mm) {
-  const SnappedTwist twist = snap_twist(yarn, period_mm);
+double segments_per_fiber(const YarnConfig& yarn, double period_mm, double segment_mm, int blocks) {
+  const SnappedTwist twist = snap_twist(yarn, period_mm, blocks);
   const int turns =
       std::max(std::abs(twist.yarn_turns + twist.ply_turns), std::abs(twist.yarn_turns));
-  return std::max({4.0, std::ceil(period_mm / segment_mm), std::ceil(kPointsPerTurn * turns)});
+  const double segments =
+      std::max({4.0, std::ceil(period_mm / segment_mm), std::ceil(kPointsPerTurn * turns)});
+  if (blocks == 0) return segments;
+  return blocks * std::max<double>(kFewestSegmentsOfBlock, std::ceil(segments / blocks));
 }
 
-double segments_of_yarn(const YarnConfig& yarn, double period_mm, double segment_mm) {
+double segments_of_yarn(const YarnConfig& yarn, double period_mm, double segment_mm, int blocks) {
   const auto open_fiber = [&](double length_mm) {
     return std::max<double>(kFewestSegments, length_mm / segment_mm + 0.5);
   };
@@ -425,7 +472,7 @@ double segments_of_yarn(const YarnConfig& yarn, double period_mm, double segment
       2 * std::hypot(hairs.rise_mm.mean, std::hypot(hairs.along_mm.mean, hairs.along_mm.deviation),
                      (hairs.start_mm.mean + hairs.rise_mm.mean) *
                          std::hypot(hairs.around.mean, hairs.around.deviation));
-  double of_ply = yarn.fibers_per_ply * segments_per_fiber(yarn, period_mm, segment_mm) +
+  double of_ply = yarn.fibers_per_ply * segments_per_fiber(yarn, period_mm, segment_mm, blocks) +
                   hairs.per_mm * period_mm * open_fiber(hair);
   for (const Slubs& slubs : yarn.slubs) {
     const double more = std::max(0.0, std::pow(slubs.thickness.mean, 2) - 1);
@@ -438,8 +485,9 @@ double segments_of_yarn(const YarnConfig& yarn, double period_mm, double segment
 
 void add_fibers_of_yarn(const YarnConfig& yarn, double fiber_radius_mm, const CentreLine& line,
                         double segment_mm, std::uint64_t seed, std::uint32_t yarn_index,
-                        Exemplar& exemplar) {
-  FibersOfYarn(yarn, fiber_radius_mm, line, segment_mm, seed, yarn_index, exemplar).add_all();
+                        Exemplar& exemplar, const BlocksOfYarn& blocks) {
+  FibersOfYarn(yarn, fiber_radius_mm, line, segment_mm, seed, yarn_index, blocks, exemplar)
+      .add_all();
 }
 
 }  // namespace heddle

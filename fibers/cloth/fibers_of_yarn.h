@@ -20,29 +20,32 @@
 
 #include "fibers/cloth/centre_line.h"
 #include "fibers/cloth/exemplar.h"
+#include "fibers/cloth/fitting_fibers.h"
 #include "fibers/cloth/yarn_config.h"
 
 namespace heddle {
 
-/// Twist in whole turns over one period of the yarn.
+/// Twist in whole turns over one period of the yarn; of `blocks` blocks that fit, if any.
 struct SnappedTwist {
   int yarn_turns;
   int ply_turns;
 };
-SnappedTwist snap_twist(const YarnConfig& yarn, double period_mm);
+SnappedTwist snap_twist(const YarnConfig& yarn, double period_mm, int blocks = 0);
 
 /// Pieces of each fiber over one period of the yarn: as short as the config asks for, and enough to
 /// follow its twist.
-double segments_per_fiber(const YarnConfig& yarn, double period_mm, double segment_mm);
+double segments_per_fiber(const YarnConfig& yarn, double period_mm, double segment_mm,
+                          int blocks = 0);
 
 /// Segments that one yarn is expected to have, flyaways and uneven places too. Exact without these.
-double segments_of_yarn(const YarnConfig& yarn, double period_mm, double segment_mm);
+double segments_of_yarn(const YarnConfig& yarn, double period_mm, double segment_mm,
+                        int blocks = 0);
 
 /// Appends the fibers of one yarn to the exemplar (points, radius, material, yarn, is_open). Throws
 /// std::invalid_argument where the yarn has no room for the loops that it asks for.
 void add_fibers_of_yarn(const YarnConfig& yarn, double fiber_radius_mm, const CentreLine& line,
                         double segment_mm, std::uint64_t seed, std::uint32_t yarn_index,
-                        Exemplar& exemplar);
+                        Exemplar& exemplar, const BlocksOfYarn& blocks = {});
 
 }  // namespace heddle
 

@@ -19,7 +19,19 @@ namespace {
 constexpr double kPointBytesPerSegment = 3 * 20;
 constexpr double kMostSegments = 0x1p31;
 
-using AddYarn = std::function<void(const YarnConfig&, const CentreLine&)>;
+using AddYarn =
+    std::function<void(const YarnConfig&, const CentreLine&, const BlocksOfYarn& blocks)>;
+
+/// The blocks along yarn `place` of a system that must fit, if any.
+BlocksOfYarn blocks_along(const FabricConfig& config, bool is_warp, int place) {
+  const auto [x, y] = config.fitting_blocks;
+  if (x == 0) return {};
+  const int warp_yarns = config.weave.ends * config.repeats_x;
+  const int pattern_yarn =
+      is_warp ? place % (config.weave.ends * x) : warp_yarns + place % (config.weave.picks * y);
+  return {is_warp ? config.repeats_y / y : config.repeats_x / x,
+          static_cast<std::uint32_t>(pattern_yarn)};
+}
 
 void add_courses(const FabricConfig& config, Exemplar& exemplar, const AddYarn& add_yarn) {
   const KnitConfig& knit = *config.knit;
@@ -28,7 +40,7 @@ void add_courses(const FabricConfig& config, Exemplar& exemplar, const AddYarn& 
   const LoopForm loop = solve_loop(knit, thickest_yarn_mm(config, knit.sequence));
   for (int course = 0; course < knit.courses; ++course) {
     const YarnConfig& yarn = config.yarn(knit.yarn_of(course));
-    add_yarn(yarn, centre_line_of_course(loop, knit, course, yarn.width_mm, yarn.height_mm));
+    add_yarn(yarn, centre_line_of_course(loop, knit, course, yarn.width_mm, yarn.height_mm), {});
   }
 }
 
@@ -39,8 +51,10 @@ void add_curves(const FabricConfig& config, Exemplar& exemplar, const AddYarn& a
   for (const TileCurve& curve : curves_on_tile(curves, config.segment_mm, nullptr)) {
     if (curves.as_yarns) {
       const YarnConfig& yarn = config.yarn(curves.yarn_of(curve.curve));
-      add_yarn(yarn, sampled_line(curve.points, steady_ups(curve.points, curve.is_open),
-                                  yarn.width_mm, yarn.height_mm, curve.is_open));
+      add_yarn(yarn,
+               sampled_line(curve.points, steady_ups(curve.points, curve.is_open), yarn.width_mm,
+                            yarn.height_mm, curve.is_open),
+               {});
       continue;
     }
     for (const Vec3d& point : curve.points) exemplar.points.push_back(point.cast<float>());
@@ -67,8 +81,8 @@ void close_periods(Exemplar& exemplar) {
 
 ExemplarForecast forecast_exemplar(const FabricConfig& config) {
   ExemplarForecast forecast;
-  const auto add_yarn = [&](const YarnConfig& yarn, double length_mm) {
-    forecast.segments += segments_of_yarn(yarn, length_mm, config.segment_mm);
+  const auto add_yarn = [&](const YarnConfig& yarn, double length_mm, int blocks) {
+    forecast.segments += segments_of_yarn(yarn, length_mm, config.segment_mm, blocks);
     ++forecast.yarns;
   };
   double area = 0;
@@ -76,12 +90,12 @@ ExemplarForecast forecast_exemplar(const FabricConfig& config) {
     const KnitConfig& knit = *config.knit;
     area = knit.width_mm() * knit.height_mm();
     for (int course = 0; course < knit.courses; ++course)
-      add_yarn(config.yarn(knit.yarn_of(course)), knit.wales * usual_loop_length(knit));
+      add_yarn(config.yarn(knit.yarn_of(course)), knit.wales * usual_loop_length(knit), 0);
   } else if (config.curves) {
     area = config.curves->size_mm[0] * config.curves->size_mm[1];
     for (const TileCurve& curve : curves_on_tile(*config.curves, config.segment_mm, nullptr)) {
       if (config.curves->as_yarns) {
-        add_yarn(config.yarn(config.curves->yarn_of(curve.curve)), length_of(curve));
+        add_yarn(config.yarn(config.curves->yarn_of(curve.curve)), length_of(curve), 0);
       } else {
         forecast.segments += static_cast<double>(curve.points.size() - 1);
       }
@@ -91,11 +105,14 @@ ExemplarForecast forecast_exemplar(const FabricConfig& config) {
     const double height = weft_places(config).period_mm;
     area = width * height;
     // Whole sequences fill the tile.
-    const auto add_system = [&](const ThreadSystem& system, int count, double period_mm) {
-      for (int k = 0; k < count; ++k) add_yarn(config.yarn(system.yarn_at(k)), period_mm);
+    const auto add_system = [&](bool is_warp, int count, double period_mm) {
+      const ThreadSystem& system = is_warp ? config.warp : config.weft;
+      for (int k = 0; k < count; ++k) {
+        add_yarn(config.yarn(system.yarn_at(k)), period_mm, blocks_along(config, is_warp, k).count);
+      }
     };
-    add_system(config.warp, config.weave.ends * config.repeats_x, height);
-    add_system(config.weft, config.weave.picks * config.repeats_y, width);
+    add_system(true, config.weave.ends * config.repeats_x, height);
+    add_system(false, config.weave.picks * config.repeats_y, width);
   }
   if (config.pile) forecast.segments += segments_of_pile(*config.pile, area, config.segment_mm);
   forecast.bytes = kPointBytesPerSegment * forecast.segments;
@@ -119,9 +136,10 @@ Exemplar synthesize(const FabricConfig& config, const std::function<void()>& yar
   // fibers have a point more than segments
   exemplar.points.reserve(static_cast<std::size_t>(1.25 * forecast.segments));
   std::uint32_t yarn_index = 0;
-  const auto add_yarn = [&](const YarnConfig& yarn, const CentreLine& line) {
+  const auto add_yarn = [&](const YarnConfig& yarn, const CentreLine& line,
+                            const BlocksOfYarn& blocks) {
     add_fibers_of_yarn(yarn, config.fiber_of(yarn).radius_mm, line, config.segment_mm, config.seed,
-                       yarn_index++, exemplar);
+                       yarn_index++, exemplar, blocks);
     yarn_done();
   };
   if (config.knit) {
@@ -132,12 +150,15 @@ Exemplar synthesize(const FabricConfig& config, const std::function<void()>& yar
     const YarnPaths paths = lay_yarns(config);
     exemplar.width_mm = static_cast<float>(paths.width_mm);
     exemplar.height_mm = static_cast<float>(paths.height_mm);
-    const auto add_system = [&](const ThreadSystem& system, const std::vector<YarnPath>& lines) {
-      for (std::size_t k = 0; k < lines.size(); ++k)
-        add_yarn(config.yarn(system.yarn_at(static_cast<int>(k))), centre_line(lines[k]));
+    const auto add_system = [&](bool is_warp, const std::vector<YarnPath>& lines) {
+      const ThreadSystem& system = is_warp ? config.warp : config.weft;
+      for (int k = 0; k < static_cast<int>(lines.size()); ++k) {
+        add_yarn(config.yarn(system.yarn_at(k)), centre_line(lines[static_cast<std::size_t>(k)]),
+                 blocks_along(config, is_warp, k));
+      }
     };
-    add_system(config.warp, paths.warp);
-    add_system(config.weft, paths.weft);
+    add_system(true, paths.warp);
+    add_system(false, paths.weft);
   }
   close_periods(exemplar);
   if (config.pile) {

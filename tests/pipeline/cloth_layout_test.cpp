@@ -69,6 +69,21 @@ TEST(ClothLayout, BlocksNeedAWeave) {
             "scene.toml: blocks are repeats of a weave, and small is not woven");
 }
 
+TEST(ClothLayout, ScatteredBlocksAreThoseThatFit) {
+  FabricConfig fabric = test::small_fabric();
+  fabric.repeats_x = fabric.repeats_y = 4;
+  fabric.fitting_blocks = {2, 1};
+  ClothConfig cloth = patterned();
+  EXPECT_EQ(message(cloth, fabric, fabric), "");
+  cloth.blocks->order = BlockOrder::kScattered;
+  EXPECT_EQ(
+      message(cloth, fabric, fabric),
+      "scene.toml: scattered blocks of 1 x 1 repeats would not fit each other: those of small "
+      "that do have 2 x 1 (fitting_repeats)");
+  cloth.blocks->size_repeats = {4, 2};
+  EXPECT_EQ(message(cloth, fabric, fabric), "");
+}
+
 TEST(ClothLayout, UnequalBlocksAreNamedWithTheirNumbers) {
   const FabricConfig plain = test::small_fabric();
   const FabricConfig satin = test::small_fabric("satin 5/2");
