@@ -180,8 +180,15 @@ double FittingFibers::turns(const FittingFiber& fiber, double share) const {
 }
 
 double FittingFibers::migration_phase(const FittingFiber& fiber, double share) const {
-  return fiber.migration_phase +
-         kFullTurn * (waves_by_turn_ * turns(fiber, share) + waves_of_block_ * blocks_ * share);
+  double ahead = 0;
+  if (!fiber.phase_within.empty()) {
+    const InBlock at = in_block(share);
+    const double from_border = std::min(at.share, 1 - at.share);
+    ahead = smooth_step((from_border - flat_) / (0.5 - flat_)) *
+            fiber.phase_within[static_cast<std::size_t>(at.block)];
+  }
+  const double waves = waves_by_turn_ * turns(fiber, share) + waves_of_block_ * blocks_ * share;
+  return fiber.migration_phase + ahead + kFullTurn * waves;
 }
 
 Eigen::Vector2d FittingFibers::wander_mm(const FittingFiber& fiber, double share) const {
