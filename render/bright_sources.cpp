@@ -14,7 +14,7 @@ namespace {
 constexpr float kEdgeShare = 0.05F;
 
 /// Brightest pixels that are looked at without finding a source.
-constexpr int kMostMisses = 256;
+constexpr int kMostMisses = 64;
 
 constexpr double kSharpestSource = 1e6;
 

@@ -248,7 +248,7 @@ TEST(NearLightsLaw, PartsOfARectangleAddUpToIt) {
   Light light = test::rectangle_light({4, -2, 9}, {-1, 1, -3}, {0, 0, 1}, 60, 90, kRadiance);
   light.gaussians = 16;
   const Vec3d point(0.5, -0.25, -20);
-  const auto nearest = [](const Vec3d& place) { return place.z() + 40; };
+  const auto nearest = [](const Vec3d& place) { return place.z() + 90; };
   for (const bool is_textured : {false, true}) {
     if (is_textured) light.texture = uneven_texture();
     const std::vector<Light> parts = split_rectangle(light, nearest);
