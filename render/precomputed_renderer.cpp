@@ -227,8 +227,10 @@ void PrecomputedRenderer::tint_yarns(const GBuffer& g_buffer, std::span<EyeSampl
 Rgb PrecomputedRenderer::surface_light(const SeenSurface& surface, RandomStream& random) const {
   const SurfaceHit& hit = surface.hit;
   if (surface.surface < settings_.interactive.size() && settings_.interactive[surface.surface]) {
-    return settings_.interactive[surface.surface]->light(hit, surface.wo,
-                                                         far_lights_at(lights_, hit.position));
+    const InteractiveSurface& interactive = *settings_.interactive[surface.surface];
+    if (std::none_of(lights_.begin(), lights_.end(), [](const Light& l) { return l.is_near(); }))
+      return interactive.light(hit, surface.wo, lights_);
+    return interactive.light(hit, surface.wo, far_lights_at(lights_, hit.position));
   }
   return surface_direct_light(
       hit, surface.wo, scene_lights_, LightEstimator::kCombined, random,
