@@ -289,13 +289,17 @@ void LightShapes::moments(int order, bool both_sides, std::optional<float> sharp
     return;
   }
   const float place = kPerOctave * std::log2(std::clamp(*sharpness, kLeast, kMost) / kLeast);
-  const std::size_t k = std::min(static_cast<std::size_t>(place), kCount - 2);
-  const float share = place - static_cast<float>(k);
-  std::array<float, SummedLight::kMost> high;
-  at(k).moments(order, both_sides, axis, moments);
-  at(k + 1).moments(order, both_sides, axis, high.data());
-  for (int j = 0; j < sh_count(order); ++j)
-    moments[j] += share * (high[static_cast<std::size_t>(j)] - moments[j]);
+  const std::size_t middle =
+      std::clamp<std::size_t>(static_cast<std::size_t>(place + 0.5F), 1, kCount - 2);
+  const float x = place - static_cast<float>(middle);
+  const std::array<float, 3> weights = {0.5F * x * (x - 1), 1 - x * x, 0.5F * x * (x + 1)};
+  std::fill_n(moments, sh_count(order), 0.0F);
+  for (std::size_t k = 0; k < 3; ++k) {
+    std::array<float, SummedLight::kMost> own;
+    at(middle + k - 1).moments(order, both_sides, axis, own.data());
+    for (int j = 0; j < sh_count(order); ++j)
+      moments[j] += weights[k] * own[static_cast<std::size_t>(j)];
+  }
 }
 
 Rgb MultipleScattering::radiance(const LightShape& light, const Vec3& axis, std::uint32_t segment,

@@ -154,7 +154,7 @@ class MultipleScattering {
 };
 
 /// Shapes of every sharpness: those of powers of the root of 2, built when first used (30 ms each),
-/// and linear interpolation in the logarithm between them. That is off by 5e-3 of the largest
+/// and quadratic interpolation in the logarithm between. That is off by 5e-3 of the largest
 /// coefficient at most (measured by its test). Thread-safe.
 class LightShapes {
  public:

@@ -586,11 +586,11 @@ TEST(PrecomputedRendererEndToEnd, SameBytesForAnyThreadsUnderNearLights) {
 }
 
 TEST(PrecomputedRenderer, RectanglesAreSplitByTheNearestCloth) {
-  Light light = test::rectangle_light({0, 0, 40}, {0, 0, -1}, {0, 1, 0}, 40, 10, Rgb(1, 1, 1));
+  Light light = test::rectangle_light({0, 0, 20}, {0, 0, -1}, {0, 1, 0}, 40, 10, Rgb(1, 1, 1));
   const auto count = [&](const Light& own) {
     return make_world(open_pack(test_cotton()), {own})->renderer().fitted_lights().lights.size();
   };
-  EXPECT_EQ(count(light), 4U);  // 40 mm wide at 40 mm: parts of 10 mm
+  EXPECT_EQ(count(light), 4U);  // 40 mm wide at 20 mm: parts of 10 mm
   light.gaussians = 2;
   EXPECT_EQ(count(light), 2U);
   light.gaussians = 16;

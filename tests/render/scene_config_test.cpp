@@ -259,7 +259,7 @@ TEST_F(SceneConfigTest, ReadsNearLights) {
       {"gaussians = 9", "gaussians = 0", "scene.toml:51:"},
       {"position_mm = [100, 200, 300]\n", "", "position_mm"},
       {"irradiance_at_1_m = [1, 2, 3]", "irradiance = [1, 2, 3]", "irradiance_at_1_m"},
-      {"radiance = [4, 5, 6]", "radiance = [4, -5, 6]", "scene.toml:43:"},
+      {"= 20\nradiance = [4, 5, 6]", "= 20\nradiance = [4, -5, 6]", "scene.toml:43:"},
       {"type = \"point\"", "type = \"point\"\nsharpness = 3", "sharpness"},
   };
   for (const Case& c : cases) {
