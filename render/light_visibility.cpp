@@ -12,6 +12,13 @@ namespace {
 /// in front, 3 % of the draws find none of it.
 constexpr int kFaceDraws = 32;
 
+/// Does any of a near light lie above the plane through `point` across `normal` (any length)?
+bool rises_above(const Light& light, const Vec3d& point, const Vec3d& normal) {
+  const double reach = std::abs(normal.dot(light.half_right_mm)) +
+                       std::abs(normal.dot(light.half_up_mm)) + light.radius_mm * normal.norm();
+  return normal.dot(light.position_mm - point) + reach > 0;
+}
+
 Vec2 sample_gaussian2(RandomStream& random) {
   const float radius = std::sqrt(-2 * std::log(1 - random.uniform()));
   const float angle = 2 * kPif * random.uniform();
@@ -52,6 +59,10 @@ LightVisibility LightVisibilityPass::run(const GBuffer& g_buffer) const {
 LightVisibility::OfLight LightVisibilityPass::find(const ShellHit& hit, const Light& light,
                                                    RandomStream& random) const {
   const Part& part = parts_[hit.part];
+  if (light.is_near() && !part.light_from_both_sides) {
+    const Vec3d up = scene_->shell(hit.cloth).fabric_from_world(hit.tet).row(2).cast<double>();
+    if (!rises_above(light, hit.position, up)) return {};
+  }
   Vec3 direction = light.axis;
   double distance = std::numeric_limits<double>::infinity();
   float height = 0;
