@@ -10,7 +10,7 @@
 namespace heddle {
 namespace {
 
-constexpr int kWidth = 512;
+constexpr int kAcross = 512;
 
 /// A smooth sky with disks of constant radiance in it.
 struct Disk {
@@ -20,12 +20,12 @@ struct Disk {
 };
 EnvironmentMap sky_with(const std::vector<Disk>& disks) {
   const Light sky = test::sg_light({0, 0, 1}, 2, {4, 5, 7});
-  std::vector<Rgb> radiance(kWidth * kWidth / 2);
-  const EnvironmentMap grid(kWidth, kWidth / 2, radiance);
-  for (int row = 0; row < kWidth / 2; ++row) {
-    for (int column = 0; column < kWidth; ++column) {
+  std::vector<Rgb> radiance(kAcross * kAcross / 2);
+  const EnvironmentMap grid(kAcross, kAcross / 2, radiance);
+  for (int row = 0; row < kAcross / 2; ++row) {
+    for (int column = 0; column < kAcross; ++column) {
       const Vec3 w = grid.centre(row, column).cast<float>();
-      Rgb& pixel = radiance[static_cast<std::size_t>(kWidth * row + column)];
+      Rgb& pixel = radiance[static_cast<std::size_t>(kAcross * row + column)];
       pixel = light_radiance(sky, w);
       for (const Disk& disk : disks) {
         if (w.dot(disk.axis.normalized()) > std::cos(radians(disk.radius_deg)))
@@ -33,7 +33,7 @@ EnvironmentMap sky_with(const std::vector<Disk>& disks) {
       }
     }
   }
-  return {kWidth, kWidth / 2, radiance};
+  return {kAcross, kAcross / 2, radiance};
 }
 
 Rgbd light_of(const std::vector<Light>& lights) {
