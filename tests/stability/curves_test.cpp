@@ -158,8 +158,8 @@ TEST(NearLightStability, DistanceFromTheCloth) {
   for (const char* name : {"point", "sphere", "rectangle"}) {
     const auto& error = curve.of(name);
     for (std::size_t k = 0; k < curve.drivers.size(); ++k) {
-      // Hard light, a point's, is worse than a Gaussian's (zoom_curve).
-      const double limit = curve.of("Gaussian")[k] * (std::string(name) == "point" ? 1.6 : 1.15);
+      // Hard light, a point's, is worse than a Gaussian's (zoom_curve); outlines are harder too.
+      const double limit = curve.of("Gaussian")[k] * (std::string(name) == "point" ? 1.7 : 1.4);
       if (!warned(curve, curve.drivers[k])) {
         EXPECT_LT(error[k], limit) << name;
       }
