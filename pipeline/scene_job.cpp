@@ -63,6 +63,17 @@ PathTracerSettings path_tracer_settings(const PictureRequest& request) {
   return settings;
 }
 
+/// What became of the environments that bright sources are split off from.
+void say_environment(Console& console, const PrecomputedRenderer& renderer) {
+  const FittedLights& fitted = renderer.fitted_lights();
+  if (fitted.bright_sources == 0) return;
+  console.say(
+      fmt::format("environment: {} bright {} split off; irradiance is off by {:.2g} % (RMS "
+                  "over normals), all light by {:.2g} %",
+                  fitted.bright_sources, fitted.bright_sources == 1 ? "source" : "sources",
+                  100 * fitted.irradiance_error, 100 * fitted.energy_error));
+}
+
 }  // namespace
 
 SceneVariant variant_of_fabrics(const SceneConfig& scene, const SceneVariant::OfFabric& of_each) {
@@ -247,7 +258,7 @@ std::string SceneJob::picture_key(const PictureRequest& request) {
     values.emplace_back("interactive", surface);
   for (const std::size_t k : variant_.stand_ins)
     values.emplace_back("stand_in", fmt::format("{}", k));
-  for (const fs::path& map : config_.environment_files)
+  for (const fs::path& map : config_.light_files)
     values.emplace_back("environment", content_hash_of_file(map));
   for (const MeshFile& mesh : config_.meshes)
     values.emplace_back("mesh", content_hash_of_file(mesh.path));
@@ -406,13 +417,13 @@ PictureResult SceneJob::render(const PictureRequest& request, const std::string&
   };
 
   const std::unique_ptr<Shading> shading = shading_for(request);
+  if (shading->renderer && !quiet) say_environment(*context_->console, *shading->renderer);
   const FrameBuffers frame = shading->frame(request, camera, request.crop, report_progress);
   if (request.more) {
     PictureRequest made = request;
     made.spp = frame.spp;
     key = picture_key(made);
   }
-  const double environment_error = shading->renderer ? shading->renderer->environment_error() : 0;
 
   const WorkTime time = watch.elapsed();
 
@@ -434,7 +445,7 @@ PictureResult SceneJob::render(const PictureRequest& request, const std::string&
   };
   result.image = image_of(frame, metadata);
   result.time = time;
-  result.environment_error = environment_error;
+  if (shading->renderer) result.fitted_lights = shading->renderer->fitted_lights();
   result.failed_shell_walks = loaded.scene->failed_walks();
   result.flipped_tetrahedra = loaded.scene->flipped_tets();
   result.degenerate_tetrahedra = loaded.scene->degenerate_tets();
@@ -447,8 +458,13 @@ Json picture_report(const PictureResult& picture) {
   for (const auto& [name, value] : picture.image.metadata) report[name] = value;
   report["seconds"] = picture.time.seconds;
   report["core_seconds"] = picture.time.core_seconds;
-  if (picture.environment_error > 0)
-    report["environment_fit_relative_error"] = picture.environment_error;
+  const FittedLights& fitted = picture.fitted_lights;
+  if (fitted.relative_error > 0) {
+    report["environment_fit_relative_error"] = fitted.relative_error;
+    report["environment_bright_sources"] = fitted.bright_sources;
+    report["environment_irradiance_relative_error"] = fitted.irradiance_error;
+    report["environment_energy_relative_error"] = fitted.energy_error;
+  }
   report["failed_shell_walks"] = picture.failed_shell_walks;
   report["flipped_tetrahedra"] = picture.flipped_tetrahedra;
   report["degenerate_tetrahedra"] = picture.degenerate_tetrahedra;

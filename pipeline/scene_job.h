@@ -76,7 +76,7 @@ struct PictureRequest {
 struct PictureResult {
   Image image;  // its metadata name scene, method, key, seed, samples and crop
   WorkTime time;
-  double environment_error = 0;  // relative, of the Gaussians fitted to environments
+  FittedLights fitted_lights;  // and the errors of what stands for environments
   std::uint64_t failed_shell_walks = 0;
   std::uint32_t flipped_tetrahedra = 0;
   std::uint32_t degenerate_tetrahedra = 0;

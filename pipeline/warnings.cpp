@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -13,6 +14,7 @@
 #include "fibers/math/random.h"
 #include "formats/input_error.h"
 #include "pipeline/json_file.h"
+#include "render/near_lights.h"
 
 namespace heddle {
 namespace {
@@ -104,6 +106,8 @@ struct Probe {
   std::size_t near_rim = 0;
   std::vector<std::size_t> behind;    // [light] fabrics with light from the face only
   std::vector<std::size_t> in_plane;  // [light] fabrics with light from both sides
+  std::vector<std::size_t> close;     // [light] within kNearTiles
+  std::vector<double> least_tiles;    // [light] its distance from the nearest hit, in tiles
 };
 
 bool is_near_rim(const ClothScene& scene, const ShellHit& hit) {
@@ -123,6 +127,8 @@ Probe probe_of(const PictureSetup& setup) {
   Probe probe;
   probe.behind.assign(setup.lights.size(), 0);
   probe.in_plane.assign(setup.lights.size(), 0);
+  probe.close.assign(setup.lights.size(), 0);
+  probe.least_tiles.assign(setup.lights.size(), std::numeric_limits<double>::infinity());
   const int step = std::max(1, std::max(setup.crop.width, setup.crop.height) / kProbesAcross);
   for (int y = setup.crop.y0 + step / 2; y < setup.crop.y0 + setup.crop.height; y += step) {
     for (int x = setup.crop.x0 + step / 2; x < setup.crop.x0 + setup.crop.width; x += step) {
@@ -143,12 +149,21 @@ Probe probe_of(const PictureSetup& setup) {
         RandomStream random(1, RandomStage::kLightVisibility,
                             static_cast<std::uint64_t>(y) << 32U | static_cast<std::uint64_t>(x),
                             l);
-        const Vec3 direction = sample_light(setup.lights[l], random).direction;
+        const Light& light = setup.lights[l];
+        const LightSample sample = sample_light(light, hit->position, random);
+        const Vec3& direction = sample.direction;
+        if (light.is_near()) {
+          const double tiles = distance_to_light(light, hit->position) /
+                               std::max(exemplar.width_mm, exemplar.height_mm);
+          if (tiles < kNearTiles) ++probe.close[l];
+          probe.least_tiles[l] = std::min(probe.least_tiles[l], tiles);
+        }
         const float height_of_light = scene.fabric_direction(*hit, direction).z();
         if (setup.packs[hit->part]->light_from_both_sides) {
           if (std::abs(height_of_light) < std::sin(radians(kPlaneDegrees))) ++probe.in_plane[l];
         } else if (height_of_light <= 0 &&
-                   scene.globally_visible(scene.surface_point(*hit, ClothSide::kBack), direction)) {
+                   scene.globally_visible(scene.surface_point(*hit, ClothSide::kBack), direction,
+                                          sample.distance)) {
           ++probe.behind[l];
         }
       }
@@ -319,6 +334,14 @@ std::vector<Warning> picture_warnings(const PictureSetup& setup) {
                           1,
                           "light_from = \"both\" in the fabric, an underlay where nothing should "
                           "shine through, or --method path"});
+    }
+    if (share(probe.close[l]) > kNearShare) {
+      warnings.push_back(
+          {"near-light",
+           fmt::format("{} is as near as {:.2g} tiles to the cloth in the picture, and {} of it "
+                       "lies within {:g}: light is taken as parallel within a tile",
+                       name, probe.least_tiles[l], percent(share(probe.close[l])), kNearTiles),
+           0.1, "A light further away, or --method path"});
     }
     if (share(probe.in_plane[l]) > 0.5) {
       warnings.push_back({"behind",

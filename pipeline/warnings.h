@@ -70,6 +70,10 @@ inline constexpr double kNegativeShare = 0.01;
 // Interactive surfaces: Gaussian lights softer than this, from which the weights do not come out of
 // the integral.
 inline constexpr double kInteractiveSharpness = 20;
+// A near light closer to the cloth than this many of its tiles, and the share of what the picture
+// shows that is.
+inline constexpr double kNearTiles = 4;
+inline constexpr double kNearShare = 0.05;
 // Noise of pixels that cover more than a repeat.
 inline constexpr double kNoise = 0.1;
 

@@ -1,6 +1,9 @@
 #include "render/cloth_scene.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <utility>
 
@@ -39,6 +42,23 @@ TriangleMesh read_black_mesh(const MeshFile& file) {
   }
   mesh.triangles = obj.triangles;
   return mesh;
+}
+
+/// Squared distance of a point to a triangle: to its plane, or to the nearest edge.
+double square_distance(const Vec3d& point, const std::array<Vec3d, 3>& corner) {
+  const Vec3d normal = (corner[1] - corner[0]).cross(corner[2] - corner[0]);
+  bool is_above = normal.squaredNorm() > 0;
+  double nearest = std::numeric_limits<double>::infinity();
+  for (std::size_t k = 0; k < 3; ++k) {
+    const Vec3d edge = corner[(k + 1) % 3] - corner[k];
+    const Vec3d way = point - corner[k];
+    is_above = is_above && normal.cross(edge).dot(way) >= 0;
+    const double along = std::clamp(way.dot(edge) / std::max(edge.squaredNorm(), 1e-30), 0.0, 1.0);
+    nearest = std::min(nearest, (way - along * edge).squaredNorm());
+  }
+  if (!is_above) return nearest;
+  const double height = normal.dot(point - corner[0]);
+  return height * height / normal.squaredNorm();
 }
 
 /// Rectangles along each side of a flat cloth; its vertices may have to know what they see.
@@ -102,7 +122,13 @@ bool ClothScene::occluded(const SceneRay& ray) const {
   bool is_blocked = false;
   double limit = ray.t_max;
   walk(ray, RayReach::kEverything, limit,
-       [&](std::uint32_t cloth, const ShellInterval& interval, const OwnFiber& own) {
+       [&](std::uint32_t cloth, ShellInterval interval, const OwnFiber& own) {
+         if (interval.t1 > ray.t_max) {
+           const double share = (ray.t_max - interval.t0) / (interval.t1 - interval.t0);
+           interval.fabric1 = interval.fabric0 + share * (interval.fabric1 - interval.fabric0);
+           interval.t1 = ray.t_max;
+           if (!(interval.t1 > interval.t0)) return false;
+         }
          const Cloth& here = cloths_[cloth];
          const LocalRay local =
              local_ray(interval, here.tiling, ray.from != nullptr && interval.t0 == 0.0);
@@ -120,13 +146,31 @@ bool ClothScene::occluded(const SceneRay& ray) const {
   return is_blocked;
 }
 
-bool ClothScene::globally_visible(const Shell::SurfacePoint& point, const Vec3& direction) const {
+bool ClothScene::globally_visible(const Shell::SurfacePoint& point, const Vec3& direction,
+                                  double distance) const {
   const Vec3 origin = (point.position + kLiftMm * point.normal).cast<float>();
-  return !boundary_.occluded(origin, direction) && !meshes_.occluded(origin, direction);
+  const auto reach = static_cast<float>(distance);
+  return !boundary_.occluded(origin, direction, reach) &&
+         !meshes_.occluded(origin, direction, reach);
 }
 
-bool ClothScene::visible(const Shell::SurfacePoint& point, const Vec3& direction) const {
-  return !occluded({point.position + kLiftMm * point.normal, direction});
+bool ClothScene::visible(const Shell::SurfacePoint& point, const Vec3& direction,
+                         double distance) const {
+  return !occluded({point.position + kLiftMm * point.normal, direction, nullptr, distance});
+}
+
+double ClothScene::distance_to_cloth(const Vec3d& point) const {
+  double nearest = std::numeric_limits<double>::infinity();
+  const auto look_at = [&](const TriangleMesh& mesh) {
+    for (const std::array<std::uint32_t, 3>& t : mesh.triangles) {
+      nearest = std::min(nearest, square_distance(point, {mesh.positions[t[0]].cast<double>(),
+                                                          mesh.positions[t[1]].cast<double>(),
+                                                          mesh.positions[t[2]].cast<double>()}));
+    }
+  };
+  for (const Cloth& cloth : cloths_) look_at(cloth.shell.boundary_mesh());
+  for (const SurfaceCloth& surface : surfaces_) look_at(surface.triangle_mesh());
+  return std::sqrt(nearest);
 }
 
 ClothScene::LocalRay ClothScene::local_ray(const ShellInterval& interval, const ClothTiling& tiling,

@@ -125,7 +125,7 @@ class ClothScene {
                        return parts_[part].tile->intersect(local, own_fiber);
                      });
   }
-  /// Does the ray meet a fiber or a mesh?
+  /// Does the ray meet a fiber or a mesh up to t_max?
   bool occluded(const SceneRay& ray) const;
 
   /// Does the ray meet a mesh in (0, t_max]?
@@ -136,11 +136,17 @@ class ClothScene {
   std::optional<MeshHit> first_mesh(const Vec3d& origin, const Vec3& direction,
                                     double t_max = std::numeric_limits<double>::infinity()) const;
 
-  /// Is a point of a shell's surface, or of a mesh, open towards `direction`, past all shells (as
-  /// solids) and meshes?
-  bool globally_visible(const Shell::SurfacePoint& point, const Vec3& direction) const;
+  /// Is a point of a shell's surface, or of a mesh, open towards `direction` for `distance` mm,
+  /// past all shells (as solids) and meshes?
+  bool globally_visible(const Shell::SurfacePoint& point, const Vec3& direction,
+                        double distance = std::numeric_limits<double>::infinity()) const;
   /// The same past all fibers and meshes.
-  bool visible(const Shell::SurfacePoint& point, const Vec3& direction) const;
+  bool visible(const Shell::SurfacePoint& point, const Vec3& direction,
+               double distance = std::numeric_limits<double>::infinity()) const;
+
+  /// Distance (mm) of the nearest point of a shell's outside or a surface cloth. Looks at every
+  /// triangle.
+  double distance_to_cloth(const Vec3d& point) const;
 
   /// Surface point of the shell straight over (kFace) or under (kBack) a hit.
   Shell::SurfacePoint surface_point(const ShellHit& hit, ClothSide side) const {

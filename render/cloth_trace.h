@@ -9,6 +9,7 @@
 // are then the same integral. Tested in tests/render/cloth_trace_test.cpp.
 
 #include <cstdint>
+#include <limits>
 #include <optional>
 
 #include "render/cloth_scene.h"
@@ -50,8 +51,11 @@ class ClothTrace {
     return end;
   }
 
-  bool escapes(const Vertex& from, const Vec3& direction) const {
-    return !scene_->occluded({from.hit.position, direction, &from.hit});
+  Vec3d position(const Vertex& vertex) const { return vertex.hit.position; }
+  /// Does a ray meet neither fibers nor meshes within `distance`?
+  bool escapes(const Vertex& from, const Vec3& direction,
+               double distance = std::numeric_limits<double>::infinity()) const {
+    return !scene_->occluded({from.hit.position, direction, &from.hit, distance});
   }
 
  private:

@@ -1,17 +1,12 @@
 #include "render/environment_map.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cassert>
 #include <cmath>
-#include <string>
 #include <utility>
 
 #include "fibers/math/sampling.h"
-#include "formats/file_ending.h"
-#include "formats/hdr_file.h"
-#include "formats/input_error.h"
+#include "render/radiance_picture.h"
 
 namespace heddle {
 namespace {
@@ -56,27 +51,8 @@ EnvironmentMap::EnvironmentMap(int width, int height, std::vector<Rgb> radiance)
 }
 
 EnvironmentMap EnvironmentMap::read(const std::filesystem::path& path) {
-  const std::string ending = lower_case_ending(path);
-  const Image image = ending == ".hdr" || ending == ".pic" ? read_hdr(path) : read_exr(path);
-  std::vector<Rgb> radiance(static_cast<std::size_t>(image.width) *
-                            static_cast<std::size_t>(image.height));
-  const char* names[] = {"R", "G", "B"};
-  for (Eigen::Index c = 0; c < 3; ++c) {
-    const auto channel = image.channels.find(names[c]);
-    if (channel == image.channels.end() || channel->second.type == ChannelType::kUint) {
-      throw FileError(fmt::format("{}: an environment needs channels R, G, B", path.string()));
-    }
-    for (std::size_t k = 0; k < radiance.size(); ++k) {
-      const float value = channel->second.values[k];
-      if (!(std::isfinite(value) && value >= 0)) {
-        throw FileError(fmt::format(
-            "{}: radiance {} in channel {} at column {}, row {}", path.string(), value, names[c],
-            k % static_cast<std::size_t>(image.width), k / static_cast<std::size_t>(image.width)));
-      }
-      radiance[k][c] = value;
-    }
-  }
-  return {image.width, image.height, std::move(radiance)};
+  RadiancePicture picture = read_radiance_picture(path);
+  return {picture.width, picture.height, std::move(picture.pixels)};
 }
 
 Vec3d EnvironmentMap::centre(int row, int column) const {

@@ -15,7 +15,6 @@
 
 #include "fibers/math/random.h"
 #include "fibers/math/vector.h"
-#include "formats/image_file.h"
 #include "render/lights.h"
 
 namespace heddle {
@@ -25,8 +24,7 @@ class EnvironmentMap {
   /// radiance [row][column], finite and not negative.
   EnvironmentMap(int width, int height, std::vector<Rgb> radiance);
 
-  /// Reads OpenEXR, or a Radiance picture where the name ends in .hdr or .pic; channels R, G, B.
-  /// Errors: FileError, also for values that are negative or not finite.
+  /// From a file (radiance_picture.h). Errors: FileError.
   static EnvironmentMap read(const std::filesystem::path& path);
 
   int width() const { return width_; }

@@ -1,6 +1,7 @@
 #include "render/environment_sgs.h"
 
 #include <algorithm>
+#include <array>
 #include <cassert>
 #include <cmath>
 #include <utility>
@@ -12,6 +13,8 @@
 #include "fibers/math/nonnegative_least_squares.h"
 #include "fibers/math/special_functions.h"
 #include "fibers/math/spherical_gaussian.h"
+#include "fibers/math/spherical_harmonics.h"
+#include "render/bright_sources.h"
 
 namespace heddle {
 namespace {
@@ -289,10 +292,81 @@ EnvironmentMap blurred(const EnvironmentMap& map) {
   return {kWidth, kHeight, std::move(result)};
 }
 
-}  // namespace
+// The clamped cosine's factor of band l (Ramamoorthi and Hanrahan 2001, equation 8).
+double cosine_factor(int l) {
+  if (l == 0) return kPi;
+  if (l == 1) return 2 * kPi / 3;
+  if (l % 2 == 1) return 0;
+  double factor = 2 * kPi / ((l + 2) * (l - 1)) * (l % 4 == 0 ? -1 : 1);
+  for (int k = 1; k <= l / 2; ++k) factor *= (l / 2.0 + k) / (4.0 * k);
+  return factor;
+}
 
-EnvironmentSgs fit_environment_sgs(const EnvironmentMap& map, int count) {
-  assert(count >= 1);
+// Radiance to irradiance, in harmonics up to this order: of a directional light, the bands above
+// hold 4e-4 of the square.
+constexpr int kIrradianceOrder = 8;
+constexpr int kIrradianceCount = sh_count(kIrradianceOrder);
+
+Colors radiance_harmonics(const EnvironmentMap& map) {
+  Colors sum = Colors::Zero(kIrradianceCount, 3);
+  std::array<double, kIrradianceCount> y;
+  for (int row = 0; row < map.height(); ++row) {
+    for (int column = 0; column < map.width(); ++column) {
+      evaluate_sh(kIrradianceOrder, map.centre(row, column), y.data());
+      sum += map.solid_angle(row) * Eigen::Map<const VectorXd>(y.data(), kIrradianceCount) *
+             map.pixel(row, column).cast<double>().matrix().transpose();
+    }
+  }
+  return sum;
+}
+
+Colors radiance_harmonics(const std::vector<Light>& lights) {
+  Colors sum = Colors::Zero(kIrradianceCount, 3);
+  std::array<double, kIrradianceCount> y;
+  for (const Light& light : lights) {
+    evaluate_sh(kIrradianceOrder, light.axis.cast<double>().eval(), y.data());
+    const std::vector<double> bands =
+        spherical_bessel_ratios(kIrradianceOrder, static_cast<double>(light.sharpness));
+    for (int l = 0; l <= kIrradianceOrder; ++l) {
+      for (int j = l * l; j < (l + 1) * (l + 1); ++j)
+        y[static_cast<std::size_t>(j)] *= bands[static_cast<std::size_t>(l)];
+    }
+    sum += Eigen::Map<const VectorXd>(y.data(), kIrradianceCount) *
+           light.irradiance.cast<double>().matrix().transpose();
+  }
+  return sum;
+}
+
+// Relative RMS over normals.
+double irradiance_error(const EnvironmentMap& map, const std::vector<Light>& lights) {
+  Colors wanted =
+      radiance_harmonics(map.reduced(std::min(map.width(), 512), std::min(map.height(), 256)));
+  Colors difference = radiance_harmonics(lights) - wanted;
+  for (int l = 0; l <= kIrradianceOrder; ++l) {
+    wanted.middleRows(l * l, 2 * l + 1) *= cosine_factor(l);
+    difference.middleRows(l * l, 2 * l + 1) *= cosine_factor(l);
+  }
+  return wanted.norm() > 0 ? difference.norm() / wanted.norm() : 0;
+}
+
+Rgbd energy_of(const std::vector<Light>& lights) {
+  Rgbd sum = Rgbd::Zero();
+  for (const Light& light : lights) sum += light.irradiance.cast<double>();
+  return sum;
+}
+
+// All the light of the map, in each colour that the lights have.
+void keep_energy(const EnvironmentMap& map, std::vector<Light>& lights) {
+  const Rgbd wanted = map.integral();
+  const Rgbd held = energy_of(lights);
+  Rgb factor = Rgb::Ones();
+  for (Eigen::Index c = 0; c < 3; ++c) {
+    if (held[c] > 0) factor[c] = static_cast<float>(wanted[c] / held[c]);
+  }
+  for (Light& light : lights) light.irradiance *= factor;
+}
+
+EnvironmentSgs fit_smooth(const EnvironmentMap& map, int count) {
   const EnvironmentMap smooth = blurred(map);
   Lobes lobes;
   {
@@ -324,6 +398,27 @@ EnvironmentSgs fit_environment_sgs(const EnvironmentMap& map, int count) {
   std::stable_sort(result.lights.begin(), result.lights.end(), [](const Light& a, const Light& b) {
     return a.irradiance.sum() > b.irradiance.sum();
   });
+  return result;
+}
+
+}  // namespace
+
+EnvironmentSgs fit_environment_sgs(const EnvironmentMap& map, int count, int bright_sources) {
+  assert(count >= 1);
+  EnvironmentSgs result;
+  if (bright_sources > 0) {
+    SplitEnvironment split = split_bright_sources(map, bright_sources);
+    result = fit_smooth(split.rest, count);
+    keep_energy(split.rest, result.lights);
+    result.bright_sources = static_cast<int>(split.sources.size());
+    result.lights.insert(result.lights.begin(), split.sources.begin(), split.sources.end());
+  } else {
+    result = fit_smooth(map, count);
+  }
+  result.irradiance_error = irradiance_error(map, result.lights);
+  const Rgbd wanted = map.integral();
+  if (wanted.sum() > 0)
+    result.energy_error = (energy_of(result.lights) - wanted).abs().sum() / wanted.sum();
   return result;
 }
 

@@ -11,8 +11,11 @@
 // all axes, sharpnesses and colours are moved together by Levenberg-Marquardt steps. Non-negative
 // least squares keeps colours at or above 0. This runs on 64 x 32 pixels first, and at the end on
 // 128 x 64. At last the blur is taken out of the sharpnesses, up to kSharpestLight. There are no
-// random numbers: equal maps give equal lights. 0.3 s for 10 Gaussians, 4 s for 64. Tested in
-// tests/render/environment_sgs_test.cpp; errors for real maps: docs/surface-models.md.
+// random numbers: equal maps give equal lights. 0.3 s for 10 Gaussians, 4 s for 64.
+//
+// Small bright sources may be split off first (bright_sources.h). Then the Gaussians are scaled, in
+// each colour, to bring all the light of the rest. Tested in tests/render/environment_sgs_test.cpp;
+// errors for real maps: docs/surface-models.md.
 
 #include <vector>
 
@@ -25,13 +28,17 @@ inline constexpr double kEnvironmentBlur = 120;
 inline constexpr double kSharpestLight = 2000;
 
 struct EnvironmentSgs {
-  std::vector<Light> lights;  // [count] spherical Gaussians, brightest first
-  // root of the integral of |L - sum|^2 over that of |L|^2, both blurred
-  double relative_error;
+  // spherical Gaussians: the bright sources, then `count` others, brightest first
+  std::vector<Light> lights;
+  int bright_sources = 0;
+  // of the rest: root of the integral of |L - sum|^2 over that of |L|^2, both blurred
+  double relative_error = 0;
+  double irradiance_error = 0;  // of all: relative RMS of the irradiance over normals, to order 8
+  double energy_error = 0;      // of all: sum over colours of what is missing or too much, relative
 };
 
-/// count >= 1. A black map gives black lights and error 0.
-EnvironmentSgs fit_environment_sgs(const EnvironmentMap& map, int count);
+/// count >= 1; at most `bright_sources` are split off. A black map gives black lights and error 0.
+EnvironmentSgs fit_environment_sgs(const EnvironmentMap& map, int count, int bright_sources = 0);
 
 }  // namespace heddle
 

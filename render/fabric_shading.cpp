@@ -28,6 +28,7 @@ TransferShading::TransferShading(const ShadingInputs& inputs,
     : scene_(inputs.scene),
       lights_(inputs.lights),
       shapes_(inputs.shapes),
+      near_shapes_(inputs.near_shapes),
       single_(std::move(single)),
       cut_transfer_(cut_transfer(inputs)),
       transfer_(cut_transfer_ ? cut_transfer_.get() : &*inputs.pack->transfer),
@@ -38,26 +39,34 @@ void TransferShading::shade(const GBuffer& g_buffer, const LightVisibility& visi
                             std::span<EyeSample> seen) const {
   const int values = 3 * transfer_->coefficients();
   std::vector<KeptLight> kept(lights_.size());
+  SummedLight near_light;
   for (const std::uint32_t k : fibers) {
-    const ShadingPoint& point = g_buffer.fibers[k].point;
-    EyeSample& sample = seen[g_buffer.fibers[k].sample];
+    const SeenFiber& fiber = g_buffer.fibers[k];
+    const ShadingPoint& point = fiber.point;
+    EyeSample& sample = seen[fiber.sample];
     IncomingField field;
     std::fill_n(field.begin(), values, 0.0F);
     bool any_nearby = false;
+    bool any_near = false;
     for (std::size_t l = 0; l < lights_.size(); ++l) {
-      const Light& light = lights_[l];
       const LightVisibility::OfLight visible = visibility.of(k, l);
       if (!visible.at_point && !visible.nearby) continue;
-      const DirectionPair axis = {light.axis,
-                                  scene_->fabric_direction(g_buffer.fibers[k].hit, light.axis)};
+      const SeenLight light = seen_from(lights_[l], fiber.hit.position);
+      const DirectionPair axis = {light.axis, scene_->fabric_direction(fiber.hit, light.axis)};
       if (visible.at_point) {
         sample.single +=
-            light.irradiance * (light.is_directional()
+            light.irradiance * (light.is_directional
                                     ? single_->directional(point, axis)
                                     : single_->spherical_gaussian(point, axis, light.sharpness));
       }
       if (!visible.nearby) continue;
       any_nearby = true;
+      if (lights_[l].is_near()) {
+        if (!any_near) multiple_.clear(near_light);
+        any_near = true;
+        sample.multiple += multiple_.add(light, axis.fabric, *near_shapes_, point, near_light);
+        continue;
+      }
       KeptLight& own = kept[l];
       if (own.cell != point.cell || own.axis != axis.fabric) {
         own.cell = point.cell;
@@ -65,11 +74,12 @@ void TransferShading::shade(const GBuffer& g_buffer, const LightVisibility& visi
         multiple_.incoming(point.cell, shapes_[l], axis.fabric, own.light);
       }
       for (int j = 0; j < values; ++j) field[j] += light.irradiance[j % 3] * own.light.harmonics[j];
-      sample.multiple +=
-          light.irradiance * multiple_.outgoing_from_cones(own.light, shapes_[l], axis.fabric,
-                                                           point.segment, point.material,
-                                                           point.tangent.fabric, point.wo.fabric);
+      sample.multiple += light.irradiance *
+                         multiple_.outgoing_from_cones(own.light, shapes_[l].on_cones(),
+                                                       axis.fabric, point.segment, point.material,
+                                                       point.tangent.fabric, point.wo.fabric);
     }
+    if (any_near) multiple_.incoming(point.cell, *near_shapes_, near_light, field);
     if (any_nearby) {
       sample.multiple +=
           multiple_.outgoing(field, point.material, point.tangent.fabric, point.wo.fabric);
@@ -92,8 +102,9 @@ void DualScatteringShading::shade(const GBuffer& g_buffer, const LightVisibility
       if (!visibility.of(k, l).at_point) continue;
       const DualScattering::Parts parts =
           scattered(g_buffer.fibers[k], visibility.direction[k * lights_.size() + l]);
-      sample.single += lights_[l].irradiance * parts.single;
-      sample.multiple += lights_[l].irradiance * parts.multiple;
+      const Rgb irradiance = seen_from(lights_[l], g_buffer.fibers[k].hit.position).irradiance;
+      sample.single += irradiance * parts.single;
+      sample.multiple += irradiance * parts.multiple;
     }
   }
 }

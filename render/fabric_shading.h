@@ -29,8 +29,9 @@ struct ShadingInputs {
   const ClothScene* scene;
   const TileScene* tile;  // of the fabric
   const FabricPack* pack;
-  std::span<const Light> lights;                           // directional and Gaussian ones
-  std::span<const MultipleScattering::LightShape> shapes;  // [light]
+  std::span<const Light> lights;                           // no environments
+  std::span<const MultipleScattering::LightShape> shapes;  // [light] of those at infinity
+  const LightShapes* near_shapes;
   VisibilityBlend blend;
   // Highest band of the transfer that is used; all of them where empty.
   std::optional<int> transfer_order;
@@ -46,8 +47,8 @@ class FabricShading {
 };
 
 /// Single scattering by a model, multiple scattering by the pack's transfer. Incoming fields of all
-/// lights are summed before they are turned and scattered. They are kept while cell and light
-/// direction stay the same.
+/// lights are summed before they are turned and scattered. Those of lights at infinity are kept
+/// while cell and light direction stay the same; near lights are summed before the transfer.
 class TransferShading final : public FabricShading {
  public:
   TransferShading(const ShadingInputs& inputs, std::unique_ptr<const SingleScatteringModel> single);
@@ -58,6 +59,7 @@ class TransferShading final : public FabricShading {
   const ClothScene* scene_;
   std::span<const Light> lights_;
   std::span<const MultipleScattering::LightShape> shapes_;
+  const LightShapes* near_shapes_;
   std::unique_ptr<const SingleScatteringModel> single_;
   std::unique_ptr<const Transfer> cut_transfer_;  // in place of the pack's
   const Transfer* transfer_;

@@ -1,6 +1,7 @@
 #include "render/light_visibility.h"
 
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <utility>
 
@@ -10,6 +11,13 @@ namespace {
 /// Draws after which a light counts as wholly behind the cloth. Of a light with a tenth of its mass
 /// in front, 3 % of the draws find none of it.
 constexpr int kFaceDraws = 32;
+
+/// Does any of a near light lie above the plane through `point` across `normal` (any length)?
+bool rises_above(const Light& light, const Vec3d& point, const Vec3d& normal) {
+  const double reach = std::abs(normal.dot(light.half_right_mm)) +
+                       std::abs(normal.dot(light.half_up_mm)) + light.radius_mm * normal.norm();
+  return normal.dot(light.position_mm - point) + reach > 0;
+}
 
 Vec2 sample_gaussian2(RandomStream& random) {
   const float radius = std::sqrt(-2 * std::log(1 - random.uniform()));
@@ -40,8 +48,9 @@ LightVisibility LightVisibilityPass::run(const GBuffer& g_buffer) const {
       const LightVisibility::OfLight visible = find(fiber.hit, light, random);
       result.visible.push_back(visible);
       if (!draw_directions_) continue;
-      result.direction.push_back(visible.at_point ? sample_light(light, random).direction
-                                                  : Vec3(0, 0, 0));
+      result.direction.push_back(visible.at_point
+                                     ? sample_light(light, fiber.hit.position, random).direction
+                                     : Vec3(0, 0, 0));
     }
   }
   return result;
@@ -50,23 +59,39 @@ LightVisibility LightVisibilityPass::run(const GBuffer& g_buffer) const {
 LightVisibility::OfLight LightVisibilityPass::find(const ShellHit& hit, const Light& light,
                                                    RandomStream& random) const {
   const Part& part = parts_[hit.part];
+  if (light.is_near() && !part.light_from_both_sides) {
+    const Vec3d up = scene_->shell(hit.cloth).fabric_from_world(hit.tet).row(2).cast<double>();
+    if (!rises_above(light, hit.position, up)) return {};
+  }
   Vec3 direction = light.axis;
+  double distance = std::numeric_limits<double>::infinity();
   float height = 0;
   for (int draw = 0; draw < kFaceDraws; ++draw) {
-    if (!light.is_directional()) direction = sample_light(light, random).direction;
+    if (!light.is_directional()) {
+      const LightSample sample = sample_light(light, hit.position, random);
+      if (light.is_near() && (sample.weight == 0).all()) return {};  // on its dark side
+      direction = sample.direction;
+      distance = sample.distance;
+    }
     height = scene_->fabric_direction(hit, direction).z();
-    if (part.light_from_both_sides || height > 0 || light.is_directional()) break;
+    if (part.light_from_both_sides || height > 0 || light.is_delta()) break;
   }
   if (!part.light_from_both_sides && !(height > 0)) return {};
   const ClothSide side = height > 0 ? ClothSide::kFace : ClothSide::kBack;
 
+  // Rays to near lights end at the point that was drawn there, wherever they start.
+  const auto open = [&](const Shell::SurfacePoint& from) {
+    if (!light.is_near()) return scene_->globally_visible(from, direction);
+    const Vec3d way = hit.position + distance * direction.cast<double>() - from.position;
+    return scene_->globally_visible(from, way.normalized().cast<float>(), way.norm());
+  };
   LightVisibility::OfLight result;
-  result.at_point = scene_->globally_visible(scene_->surface_point(hit, side), direction);
+  result.at_point = open(scene_->surface_point(hit, side));
   const Eigen::Vector2d moved =
       hit.fabric.head<2>() + part.shadow_sigma_mm * sample_gaussian2(random).cast<double>();
   const std::optional<Shell::SurfacePoint> nearby = scene_->surface_point(hit, moved, side);
   // Beyond a rim there is no cloth to take light from.
-  result.nearby = nearby ? scene_->globally_visible(*nearby, direction) : result.at_point;
+  result.nearby = nearby ? open(*nearby) : result.at_point;
   return result;
 }
 

@@ -8,7 +8,8 @@
 // or below it where the light is under the cloth; it serves single scattering. The second starts
 // from a point that is moved along the cloth by a 2D Gaussian; its mean is the smoothed visibility
 // of multiple scattering. For a spherical Gaussian both go in one direction drawn from the light,
-// and the mean is a soft shadow. Where the fabric takes light from its face only, that direction is
+// and the mean is a soft shadow. For a sphere or rectangle both end at one point drawn from it, for
+// a point light at that. Where the fabric takes light from its face only, that direction is
 // drawn from the part of the light on the face's side, since precomputed data hold no other light.
 // Tested in tests/render/precomputed_renderer_test.cpp.
 
@@ -48,7 +49,7 @@ class LightVisibilityPass {
     bool light_from_both_sides;
     double shadow_sigma_mm;  // deviation of the Gaussian along the cloth
   };
-  /// parts: [part of the scene]. lights: directional and Gaussian ones. The scene and the lights
+  /// parts: [part of the scene]. lights: no environments. The scene and the lights
   /// outlive the object. draw_directions: LightVisibility::direction is wanted.
   LightVisibilityPass(const ClothScene& scene, std::vector<Part> parts,
                       std::span<const Light> lights, bool draw_directions, std::uint64_t seed);

@@ -5,6 +5,7 @@
 #include "fibers/math/sampling.h"
 #include "render/environment_map.h"
 #include "render/environment_sgs.h"
+#include "render/near_lights.h"
 
 namespace heddle {
 namespace {
@@ -22,14 +23,9 @@ Vec3 picture_from_world(const Light& light, const Vec3& d) {
 }  // namespace
 
 float light_pdf(const Light& light, const Vec3& direction) {
-  switch (light.type) {
-    case LightType::kDirectional:
-      return 0;
-    case LightType::kEnvironment:
-      return light.map->pdf(picture_from_world(light, direction));
-    case LightType::kSphericalGaussian:
-      break;
-  }
+  if (light.is_directional() || light.is_near()) return 0;
+  if (light.type == LightType::kEnvironment)
+    return light.map->pdf(picture_from_world(light, direction));
   return spherical_gaussian_pdf(light.axis, light.sharpness, direction);
 }
 
@@ -41,7 +37,8 @@ Rgb light_radiance(const Light& light, const Vec3& direction) {
   return light.irradiance * light_pdf(light, direction);
 }
 
-LightSample sample_light(const Light& light, RandomStream& random) {
+LightSample sample_light(const Light& light, const Vec3d& point, RandomStream& random) {
+  if (light.is_near()) return sample_near_light(light, point, random);
   if (light.is_directional()) return {light.axis, light.irradiance, 0.0F};
   if (light.type == LightType::kEnvironment) {
     LightSample sample = light.map->sample(random);
@@ -53,6 +50,16 @@ LightSample sample_light(const Light& light, RandomStream& random) {
   return {direction, light.irradiance, light_pdf(light, direction)};
 }
 
+std::optional<MetLight> meet_light(const Light& light, const Vec3d& point, const Vec3& direction) {
+  if (!light.is_near()) return {};
+  return meet_near_light(light, point, direction);
+}
+
+SeenLight seen_from(const Light& light, const Vec3d& point) {
+  if (light.is_near()) return near_light_from(light, point);
+  return {light.axis, light.sharpness, light.irradiance, light.is_directional()};
+}
+
 FittedLights fit_environments(std::span<const Light> lights) {
   FittedLights result;
   for (const Light& light : lights) {
@@ -60,13 +67,17 @@ FittedLights fit_environments(std::span<const Light> lights) {
       result.lights.push_back(light);
       continue;
     }
-    const EnvironmentSgs fit = fit_environment_sgs(*light.map, light.gaussians);
+    const EnvironmentSgs fit =
+        fit_environment_sgs(*light.map, light.gaussians, light.bright_sources);
     for (Light gaussian : fit.lights) {
       gaussian.axis = world_from_picture(light, gaussian.axis);
       gaussian.irradiance *= light.irradiance;
       result.lights.push_back(gaussian);
     }
     result.relative_error = std::max(result.relative_error, fit.relative_error);
+    result.irradiance_error = std::max(result.irradiance_error, fit.irradiance_error);
+    result.energy_error = std::max(result.energy_error, fit.energy_error);
+    result.bright_sources += fit.bright_sources;
   }
   return result;
 }

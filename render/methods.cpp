@@ -134,10 +134,10 @@ Needs needs_of(RenderMethod method, std::span<const Light> lights, const Visibil
   needs.ssdf = row.visibility == VisibilityData::kSignedDistance;
   if (row.visibility != VisibilityData::kByLight) return needs;
   for (const Light& light : lights) {
-    if (light.type == LightType::kEnvironment) {
-      needs.ssdf = needs.sgs = true;
-    } else if (light.is_directional()) {
+    if (light.is_delta()) {
       needs.ssdf = true;
+    } else if (light.type != LightType::kSphericalGaussian) {
+      needs.ssdf = needs.sgs = true;
     } else {
       needs.ssdf |= blend.uses_distance(light.sharpness);
       needs.sgs |= blend.uses_lobes(light.sharpness);

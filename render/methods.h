@@ -81,9 +81,9 @@ struct Needs {
 };
 
 /// The data that a method needs under these lights. Where the form of visibility follows the light:
-/// signed distances if some light is directional or a Gaussian above the lower end of the blend,
-/// sums of Gaussians if one is below its upper end. An environment asks for both: the Gaussians
-/// that stand for it may be sharp and soft. The order is left empty.
+/// signed distances if some light is directional, a point or a Gaussian above the lower end of the
+/// blend, sums of Gaussians if one is below its upper end. Environments, spheres and rectangles ask
+/// for both: the Gaussians that stand for them may be sharp and soft. The order is left empty.
 Needs needs_of(RenderMethod method, std::span<const Light> lights, const VisibilityBlend& blend);
 
 }  // namespace heddle

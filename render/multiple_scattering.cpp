@@ -68,13 +68,22 @@ const Circle& circle() {
 
 }  // namespace
 
+MultipleScattering::LightShape::OnCones MultipleScattering::LightShape::on_cones_of(
+    std::optional<float> sharpness, FaceLight face_light) {
+  OnCones on_cones;
+  if (face_light == FaceLight::kPrinted) on_cones.share = 0;
+  if (!sharpness) return on_cones;
+  on_cones.share *= std::clamp((*sharpness - kConesFrom) / (kConesAlone - kConesFrom), 0.0F, 1.0F);
+  on_cones.variance = 1 / std::max(*sharpness, kConesFrom);
+  return on_cones;
+}
+
 MultipleScattering::LightShape::LightShape(std::optional<float> sharpness, FaceLight face_light)
-    : directional_(!sharpness), face_light_(face_light) {
+    : directional_(!sharpness),
+      face_light_(face_light),
+      on_cones_(on_cones_of(sharpness, face_light)) {
   band_.fill(1);
-  if (face_light == FaceLight::kPrinted) cone_share_ = 0;
   if (!sharpness) return;
-  cone_share_ *= std::clamp((*sharpness - kConesFrom) / (kConesAlone - kConesFrom), 0.0F, 1.0F);
-  variance_ = 1 / std::max(*sharpness, kConesFrom);
   const std::vector<double> ratios = spherical_bessel_ratios(kMaxShOrder, *sharpness);
   std::transform(ratios.begin(), ratios.end(), band_.begin(),
                  [](double a) { return static_cast<float>(a); });
@@ -110,25 +119,27 @@ MultipleScattering::LightShape::LightShape(std::optional<float> sharpness, FaceL
   }
 }
 
+void MultipleScattering::LightShape::moments(int order, bool both_sides, const Vec3& axis,
+                                             float* moments) const {
+  if (both_sides || face_light_ == FaceLight::kPrinted) {
+    evaluate_sh(order, axis, moments);
+    for (int l = 0; l <= order; ++l) {
+      for (int m = -l; m <= l; ++m) moments[l * (l + 1) + m] *= band_[static_cast<std::size_t>(l)];
+    }
+  } else if (!directional_) {
+    moments_above(order, axis, moments);
+  } else if (axis.z() > 0) {
+    evaluate_sh(order, axis, moments);
+  } else {
+    std::fill_n(moments, sh_count(order), 0.0F);
+  }
+}
+
 void MultipleScattering::LightShape::project(int order, bool both_sides, const Vec3& axis,
                                              float* coefficients) const {
-  if (both_sides || face_light_ == FaceLight::kPrinted) {
-    evaluate_sh(order, axis, coefficients);
-    for (int l = 0; l <= order; ++l) {
-      for (int m = -l; m <= l; ++m)
-        coefficients[l * (l + 1) + m] *= band_[static_cast<std::size_t>(l)];
-    }
-    return;
-  }
-  if (!directional_) {
-    moments_above(order, axis, coefficients);
-  } else if (axis.z() > 0) {
-    evaluate_sh(order, axis, coefficients);
-  } else {
-    std::fill_n(coefficients, sh_count(order), 0.0F);
-    return;
-  }
-  HemisphereDual::of_order(order).apply(coefficients);
+  moments(order, both_sides, axis, coefficients);
+  if (!both_sides && face_light_ == FaceLight::kDual)
+    HemisphereDual::of_order(order).apply(coefficients);
 }
 
 void MultipleScattering::LightShape::moments_above(int order, const Vec3& axis,
@@ -161,17 +172,18 @@ void MultipleScattering::incoming(std::uint32_t cell, const LightShape& light, c
                                   CellLight& result) const {
   std::array<float, sh_count(kMaxShOrder)> coefficients;
   light.project(transfer_->order, transfer_->both_sides, axis, coefficients.data());
-  transfer_->incoming(cell, coefficients.data(), light.cone_share(), result.harmonics.data());
-  if (transfer_->cones && light.cone_share() > 0) {
+  const float cone_share = light.on_cones().share;
+  transfer_->incoming(cell, coefficients.data(), cone_share, result.harmonics.data());
+  if (transfer_->cones && cone_share > 0) {
     transfer_->incoming_on_cones(cell, coefficients.data(), result.cones.data());
   }
 }
 
-Rgb MultipleScattering::outgoing_from_cones(const CellLight& incoming, const LightShape& light,
-                                            const Vec3& axis, std::uint32_t segment,
-                                            std::uint16_t material, const Vec3& tangent,
-                                            const Vec3& wo) const {
-  if (!transfer_->cones || !(light.cone_share() > 0)) return Rgb::Zero();
+Rgb MultipleScattering::outgoing_from_cones(const CellLight& incoming,
+                                            const LightShape::OnCones& light, const Vec3& axis,
+                                            std::uint32_t segment, std::uint16_t material,
+                                            const Vec3& tangent, const Vec3& wo) const {
+  if (!transfer_->cones || !(light.share > 0)) return Rgb::Zero();
   // Directions on the light's cone about the bundle, in wo-space.
   const Mat3 bundle = cone_frame(bundle_tangent_[segment]);
   const Mat3 turn = wo_space(tangent, wo) * bundle.transpose();
@@ -195,7 +207,7 @@ Rgb MultipleScattering::outgoing_from_cones(const CellLight& incoming, const Lig
     const Eigen::Map<const Moments> moments(incoming.cones.data() +
                                             width * ConeTransfer::kAzimuths * 3);
     const Eigen::Matrix<float, kAzimuthNodes, 3> arriving = points.harmonics * moments;
-    const float variance = ConeTransfer::variance_of(width) + light.variance();
+    const float variance = ConeTransfer::variance_of(width) + light.variance;
     for (int half = 0; half < 2; ++half) {
       const RgbLanes lanes = arriving.middleRows<kLanes>(half * kLanes).array();
       const auto at = static_cast<std::size_t>(half);
@@ -203,7 +215,91 @@ Rgb MultipleScattering::outgoing_from_cones(const CellLight& incoming, const Lig
           materials_[material].blurred_scatter(theta_i[at], cos_turn[at], theta_o, variance, lanes);
     }
   }
-  return light.cone_share() * (2 * kPif / kAzimuthNodes) * sum;
+  return light.share * (2 * kPif / kAzimuthNodes) * sum;
+}
+
+void MultipleScattering::clear(SummedLight& sum) const {
+  for (std::size_t c = 0; c < 3; ++c) {
+    std::fill_n(sum.all[c].begin(), transfer_->coefficients(), 0.0F);
+    std::fill_n(sum.on_cones[c].begin(), transfer_->coefficients(), 0.0F);
+  }
+}
+
+Rgb MultipleScattering::add(const SeenLight& light, const Vec3& axis, const LightShapes& shapes,
+                            const ShadingPoint& point, SummedLight& sum) const {
+  const int n = transfer_->coefficients();
+  std::optional<float> sharpness;
+  if (!light.is_directional) sharpness = light.sharpness;
+  std::array<float, SummedLight::kMost> values;
+  shapes.moments(transfer_->order, transfer_->both_sides, sharpness, axis, values.data());
+  for (std::size_t c = 0; c < 3; ++c) {
+    const float irradiance = light.irradiance[static_cast<Eigen::Index>(c)];
+    for (std::size_t j = 0; j < static_cast<std::size_t>(n); ++j)
+      sum.all[c][j] += irradiance * values[j];
+  }
+  const LightShape::OnCones on_cones = LightShape::on_cones_of(sharpness, shapes.face_light());
+  if (!transfer_->cones || !(on_cones.share > 0)) return Rgb::Zero();
+  for (std::size_t c = 0; c < 3; ++c) {
+    const float irradiance = on_cones.share * light.irradiance[static_cast<Eigen::Index>(c)];
+    for (std::size_t j = 0; j < static_cast<std::size_t>(n); ++j)
+      sum.on_cones[c][j] += irradiance * values[j];
+  }
+  if (!transfer_->both_sides) HemisphereDual::of_order(transfer_->order).apply(values.data());
+  CellLight arriving;
+  transfer_->incoming_on_cones(point.cell, values.data(), arriving.cones.data());
+  return light.irradiance * outgoing_from_cones(arriving, on_cones, axis, point.segment,
+                                                point.material, point.tangent.fabric,
+                                                point.wo.fabric);
+}
+
+void MultipleScattering::incoming(std::uint32_t cell, const LightShapes& shapes,
+                                  const SummedLight& sum, IncomingField& field) const {
+  const bool by_dual =
+      !transfer_->both_sides && shapes.face_light() == LightShape::FaceLight::kDual;
+  const auto in_colors = [&](const std::array<std::array<float, SummedLight::kMost>, 3>& planes) {
+    IncomingField light;  // [j0][rgb]
+    for (std::size_t c = 0; c < 3; ++c) {
+      std::array<float, SummedLight::kMost> values = planes[c];
+      if (by_dual) HemisphereDual::of_order(transfer_->order).apply(values.data());
+      for (int j = 0; j < transfer_->coefficients(); ++j)
+        light[static_cast<std::size_t>(3 * j) + c] = values[static_cast<std::size_t>(j)];
+    }
+    return light;
+  };
+  transfer_->add_incoming(cell, in_colors(sum.all).data(), field.data());
+  if (transfer_->cones && shapes.face_light() == LightShape::FaceLight::kDual)
+    transfer_->subtract_incoming_of_cones(cell, in_colors(sum.on_cones).data(), field.data());
+}
+
+LightShapes::LightShapes(LightShape::FaceLight face_light)
+    : face_light_(face_light), directional_(std::nullopt, face_light) {}
+
+const LightShapes::LightShape& LightShapes::at(std::size_t k) const {
+  Late& late = shapes_[k];
+  std::call_once(late.once, [&] {
+    late.shape.emplace(kLeast * std::exp2(static_cast<float>(k) / kPerOctave), face_light_);
+  });
+  return *late.shape;
+}
+
+void LightShapes::moments(int order, bool both_sides, std::optional<float> sharpness,
+                          const Vec3& axis, float* moments) const {
+  if (!sharpness) {
+    directional_.moments(order, both_sides, axis, moments);
+    return;
+  }
+  const float place = kPerOctave * std::log2(std::clamp(*sharpness, kLeast, kMost) / kLeast);
+  const std::size_t middle =
+      std::clamp<std::size_t>(static_cast<std::size_t>(place + 0.5F), 1, kCount - 2);
+  const float x = place - static_cast<float>(middle);
+  const std::array<float, 3> weights = {0.5F * x * (x - 1), 1 - x * x, 0.5F * x * (x + 1)};
+  std::fill_n(moments, sh_count(order), 0.0F);
+  for (std::size_t k = 0; k < 3; ++k) {
+    std::array<float, SummedLight::kMost> own;
+    at(middle + k - 1).moments(order, both_sides, axis, own.data());
+    for (int j = 0; j < sh_count(order); ++j)
+      moments[j] += weights[k] * own[static_cast<std::size_t>(j)];
+  }
 }
 
 Rgb MultipleScattering::radiance(const LightShape& light, const Vec3& axis, std::uint32_t segment,
@@ -212,7 +308,7 @@ Rgb MultipleScattering::radiance(const LightShape& light, const Vec3& axis, std:
   CellLight arriving;
   incoming(transfer_->cell_of_segment[segment], light, axis, arriving);
   return outgoing(arriving.harmonics, material, tangent, wo) +
-         outgoing_from_cones(arriving, light, axis, segment, material, tangent, wo);
+         outgoing_from_cones(arriving, light.on_cones(), axis, segment, material, tangent, wo);
 }
 
 Rgb MultipleScattering::outgoing(const IncomingField& field, std::uint16_t material,

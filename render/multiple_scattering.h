@@ -24,9 +24,15 @@
 // the harmonics and scattered on its own, per light. The Gaussian about the light's cone, widened
 // by the light's own, is multiplied by the fiber's lobes: in closed form in inclination, and by
 // kAzimuthNodes points in azimuth about the bundle. Lights that are soft enough for the harmonics
-// do without (cone_share). Tested in tests/render/multiple_scattering_test.cpp.
+// do without (LightShape::OnCones).
+//
+// The shape of a near light changes from point to point. Its projection is interpolated between
+// shapes of a few sharpnesses (LightShapes). The transfer is linear in the light, so near lights
+// are summed in each colour before it, and each costs a projection only. On cones they stay apart.
+// Tested in tests/render/multiple_scattering_test.cpp.
 
 #include <array>
+#include <mutex>
 #include <optional>
 #include <span>
 #include <vector>
@@ -35,6 +41,8 @@
 #include "fibers/math/spherical_harmonics.h"
 #include "fibers/math/vector.h"
 #include "fibers/scattering/bcsdf_table.h"
+#include "render/lights.h"
+#include "render/single_scattering.h"
 
 namespace heddle {
 
@@ -48,6 +56,17 @@ struct CellLight {
   // [width][azimuth][rgb]
   std::array<float, ConeTransfer::kWidths * ConeTransfer::kAzimuths * 3> cones;
 };
+
+/// What several near lights send to a point, before the transfer.
+struct SummedLight {
+  static constexpr int kMost = sh_count(kMaxShOrder);
+  // [rgb][coefficient] moments or coefficients (LightShape::moments), the first sh_count(order)
+  // used
+  std::array<std::array<float, kMost>, 3> all;
+  std::array<std::array<float, kMost>, 3> on_cones;  // each light times its share on cones
+};
+
+class LightShapes;
 
 class MultipleScattering {
  public:
@@ -69,13 +88,20 @@ class MultipleScattering {
     };
     explicit LightShape(std::optional<float> sharpness, FaceLight face_light = FaceLight::kDual);
 
-    /// Share of the light on cones that is scattered as such; the rest is left in the harmonics.
-    /// From 0 at sharpness 8 to 1 at 20. On flat silk, errors of multiple scattering at sharpness 8
-    /// are 9.0 % by harmonics alone and 10.8 % by cones; at 30 they are 27 % and 14 %.
-    float cone_share() const { return cone_share_; }
-    /// Variance that the light's own width adds to a cone's.
-    float variance() const { return variance_; }
+    /// How light that stays on cones is scattered.
+    struct OnCones {
+      /// Share that is scattered as such; the rest is left in the harmonics. From 0 at sharpness 8
+      /// to 1 at 20. On flat silk, errors of multiple scattering at sharpness 8 are 9.0 % by
+      /// harmonics alone and 10.8 % by cones; at 30 they are 27 % and 14 %.
+      float share = 1;
+      float variance = 0;  // that the light's own width adds to a cone's
+    };
+    static OnCones on_cones_of(std::optional<float> sharpness, FaceLight face_light);
+    OnCones on_cones() const { return on_cones_; }
 
+    /// Moments of a light about `axis` over the directions that the transfer knows:
+    /// [sh_count(order)]. From the face and not as printed, the dual makes c_light of them.
+    void moments(int order, bool both_sides, const Vec3& axis, float* moments) const;
     /// c_light for a light about `axis` (unit, fabric space): [sh_count(order)].
     void project(int order, bool both_sides, const Vec3& axis, float* coefficients) const;
 
@@ -88,8 +114,7 @@ class MultipleScattering {
 
     bool directional_;
     FaceLight face_light_;
-    float cone_share_ = 1;
-    float variance_ = 0;
+    OnCones on_cones_;
     std::array<float, kMaxShOrder + 1> band_;  // [l]
     // [inclination][j] of a light whose axis lies in the xz plane; m < 0 are 0
     std::vector<float> upper_;
@@ -104,9 +129,19 @@ class MultipleScattering {
                const Vec3& wo) const;
   /// Radiance towards wo from a segment, by the part of `incoming` that one light sends on cones; 0
   /// where there is none.
-  Rgb outgoing_from_cones(const CellLight& incoming, const LightShape& light, const Vec3& axis,
-                          std::uint32_t segment, std::uint16_t material, const Vec3& tangent,
-                          const Vec3& wo) const;
+  Rgb outgoing_from_cones(const CellLight& incoming, const LightShape::OnCones& light,
+                          const Vec3& axis, std::uint32_t segment, std::uint16_t material,
+                          const Vec3& tangent, const Vec3& wo) const;
+
+  /// Empties a sum.
+  void clear(SummedLight& sum) const;
+  /// Adds a near light as seen from a point, about `axis` in fabric space. Returns what the part of
+  /// it on cones sends towards point.wo.
+  Rgb add(const SeenLight& light, const Vec3& axis, const LightShapes& shapes,
+          const ShadingPoint& point, SummedLight& sum) const;
+  /// Adds to `field` what the sum sends to `cell`, without what is on cones.
+  void incoming(std::uint32_t cell, const LightShapes& shapes, const SummedLight& sum,
+                IncomingField& field) const;
 
   /// Both, for one light.
   Rgb radiance(const LightShape& light, const Vec3& axis, std::uint32_t segment,
@@ -116,6 +151,36 @@ class MultipleScattering {
   const Transfer* transfer_;
   std::span<const BcsdfTable> materials_;
   std::span<const Vec3> bundle_tangent_;
+};
+
+/// Shapes of every sharpness: those of powers of the root of 2, built when first used (30 ms each),
+/// and quadratic interpolation in the logarithm between. That is off by 5e-3 of the largest
+/// coefficient at most (measured by its test). Thread-safe.
+class LightShapes {
+ public:
+  using LightShape = MultipleScattering::LightShape;
+  explicit LightShapes(LightShape::FaceLight face_light);
+
+  LightShape::FaceLight face_light() const { return face_light_; }
+  /// Without a sharpness: directional. Sharpnesses are clamped to kLeast .. kMost.
+  void moments(int order, bool both_sides, std::optional<float> sharpness, const Vec3& axis,
+               float* moments) const;
+
+  static constexpr float kLeast = 1;
+  static constexpr float kMost = 16384;
+
+ private:
+  static constexpr int kPerOctave = 2;
+  static constexpr std::size_t kCount = 14 * kPerOctave + 1;
+  struct Late {
+    std::once_flag once;
+    std::optional<LightShape> shape;
+  };
+  const LightShape& at(std::size_t k) const;
+
+  LightShape::FaceLight face_light_;
+  LightShape directional_;
+  mutable std::array<Late, kCount> shapes_;
 };
 
 /// Radiance towards wo from a fiber with this tangent in the field of harmonics up to `order`.

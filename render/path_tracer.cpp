@@ -38,8 +38,9 @@ PathTracer::Sample PathTracer::trace(const EyeRay& ray, RandomStream& random) co
     const SurfaceHit surface =
         mesh->surface->hit(mesh->triangle, mesh->u, mesh->v, ray.direction, ray.spread * mesh->t);
     sample.single = surface_direct_light(
-        surface, -ray.direction, lights_, settings_.estimator, random, [&](const Vec3& direction) {
-          return scene_->visible({surface.position, surface.normal}, direction);
+        surface, -ray.direction, lights_, settings_.estimator, random,
+        [&](const Vec3& direction, double distance) {
+          return scene_->visible({surface.position, surface.normal}, direction, distance);
         });
   } else if (hit) {
     sample = radiance(trace_.vertex(*hit), -ray.direction, random);

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "formats/input_error.h"
+#include "render/near_lights.h"
 #include "render/yarn_tints.h"
 
 namespace heddle {
@@ -83,17 +84,53 @@ std::vector<std::optional<Rgb>> own_scatterings_of(const ClothScene& scene,
   return scatterings;
 }
 
+MultipleScattering::LightShape::FaceLight projection_of(const MethodRow& method) {
+  using FaceLight = MultipleScattering::LightShape::FaceLight;
+  return method.as_printed ? FaceLight::kPrinted : FaceLight::kDual;
+}
+
+/// [light]; of near lights, a directional one, which nobody uses.
 std::vector<MultipleScattering::LightShape> shapes_of(std::span<const Light> lights,
                                                       const MethodRow& method) {
-  using FaceLight = MultipleScattering::LightShape::FaceLight;
   std::vector<MultipleScattering::LightShape> shapes;
   if (!method.takes_transfer) return shapes;
   for (const Light& light : lights) {
     std::optional<float> sharpness;
-    if (!light.is_directional()) sharpness = light.sharpness;
-    shapes.emplace_back(sharpness, method.as_printed ? FaceLight::kPrinted : FaceLight::kDual);
+    if (light.type == LightType::kSphericalGaussian) sharpness = light.sharpness;
+    shapes.emplace_back(sharpness, projection_of(method));
   }
   return shapes;
+}
+
+/// The lights of the precomputed methods: environments as Gaussians, rectangles in parts.
+FittedLights lights_for(const ClothScene& scene, std::span<const Light> lights) {
+  FittedLights fitted = fit_environments(lights);
+  std::vector<Light> split;
+  for (const Light& light : fitted.lights) {
+    if (light.type != LightType::kRectangle) {
+      split.push_back(light);
+      continue;
+    }
+    for (const Light& part :
+         split_rectangle(light, [&](const Vec3d& place) { return scene.distance_to_cloth(place); }))
+      split.push_back(part);
+  }
+  fitted.lights = std::move(split);
+  return fitted;
+}
+
+/// What stands for the lights at a point.
+std::vector<Light> far_lights_at(std::span<const Light> lights, const Vec3d& point) {
+  std::vector<Light> far;
+  for (const Light& light : lights) {
+    const SeenLight seen = seen_from(light, point);
+    Light& own = far.emplace_back();
+    own.type = seen.is_directional ? LightType::kDirectional : LightType::kSphericalGaussian;
+    own.axis = seen.axis;
+    own.sharpness = seen.sharpness;
+    own.irradiance = seen.irradiance;
+  }
+  return far;
 }
 
 /// Places in g_buffer.fibers, those of one part, cell and tetrahedron side by side.
@@ -116,12 +153,13 @@ PrecomputedRenderer::PrecomputedRenderer(const ClothScene& scene,
                                          const PrecomputedSettings& settings)
     : scene_(&scene),
       scene_lights_(lights),
-      fitted_(fit_environments(lights)),
+      fitted_(lights_for(scene, lights)),
       lights_(fitted_.lights),
       background_(background),
       settings_(settings),
       packs_(checked(packs, needs_of(settings.method, lights_, settings.blend))),
       shapes_(shapes_of(lights_, method_row(settings.method))),
+      near_shapes_(projection_of(method_row(settings.method))),
       shadings_(make_shadings()),
       own_scatterings_(own_scatterings_of(scene, packs_)),
       g_buffer_pass_(scene, packs_, bricks_of(packs, method_row(settings.method)), settings.seed),
@@ -141,6 +179,7 @@ std::vector<std::shared_ptr<const FabricShading>> PrecomputedRenderer::make_shad
                                  .pack = packs_[part],
                                  .lights = lights_,
                                  .shapes = shapes_,
+                                 .near_shapes = &near_shapes_,
                                  .blend = settings_.blend,
                                  .transfer_order = settings_.transfer_order});
     }
@@ -188,12 +227,15 @@ void PrecomputedRenderer::tint_yarns(const GBuffer& g_buffer, std::span<EyeSampl
 Rgb PrecomputedRenderer::surface_light(const SeenSurface& surface, RandomStream& random) const {
   const SurfaceHit& hit = surface.hit;
   if (surface.surface < settings_.interactive.size() && settings_.interactive[surface.surface]) {
-    return settings_.interactive[surface.surface]->light(hit, surface.wo, lights_);
+    const InteractiveSurface& interactive = *settings_.interactive[surface.surface];
+    if (std::none_of(lights_.begin(), lights_.end(), [](const Light& l) { return l.is_near(); }))
+      return interactive.light(hit, surface.wo, lights_);
+    return interactive.light(hit, surface.wo, far_lights_at(lights_, hit.position));
   }
   return surface_direct_light(
       hit, surface.wo, scene_lights_, LightEstimator::kCombined, random,
-      [&](const Vec3& direction) {
-        return scene_->globally_visible({hit.position, hit.normal}, direction);
+      [&](const Vec3& direction, double distance) {
+        return scene_->globally_visible({hit.position, hit.normal}, direction, distance);
       });
 }
 

@@ -12,11 +12,14 @@
 //
 // Surface cloths are lit directly in pass 3, with shadows of the same shells and meshes: by one
 // sample (surface_cloth.h), whose shadow rays depend on the model too, or from data of their own
-// without noise (interactive_surface.h). What is not modelled: light between different parts of the
-// cloth, and the shell's bend between two fibers of one cell. Signs of multiple scattering are kept
-// (see multiple_scattering.h): a dark pixel can be slightly negative. Random numbers are addressed
-// by pixel of the full frame and sample, and sums run in sample order: the picture depends neither
-// on threads nor on the crop. Tested in tests/render/precomputed_renderer_test.cpp.
+// without noise (interactive_surface.h). A near light acts on each sample as the directional or
+// Gaussian light that stands for it there (lights.h): exact shadows between folds, but parallel
+// light within what surrounds the sample on the cloth. What is not modelled: light between
+// different parts of the cloth, and the shell's bend between two fibers of one cell. Signs of
+// multiple scattering are kept (see multiple_scattering.h): a dark pixel can be slightly negative.
+// Random numbers are addressed by pixel of the full frame and sample, and sums run in sample order:
+// the picture depends neither on threads nor on the crop. Tested in
+// tests/render/precomputed_renderer_test.cpp.
 
 #include <cstdint>
 #include <memory>
@@ -62,8 +65,8 @@ class PrecomputedRenderer {
   PrecomputedRenderer(const PrecomputedRenderer&) = delete;
   PrecomputedRenderer& operator=(const PrecomputedRenderer&) = delete;
 
-  /// Of the Gaussians that stand for environments; 0 without environments.
-  double environment_error() const { return fitted_.relative_error; }
+  /// The lights that it shades with, and the errors of what stands for environments.
+  const FittedLights& fitted_lights() const { return fitted_; }
 
   /// Pass 1: samples first .. last - 1 of the pixels of `block`.
   GBuffer g_buffer(const Camera& camera, const PixelRect& block, int first, int last) const {
@@ -84,11 +87,13 @@ class PrecomputedRenderer {
   const ClothScene* scene_;
   std::span<const Light> scene_lights_;  // what sampled surface cloth is lit by
   FittedLights fitted_;
-  std::span<const Light> lights_;  // what all else is lit by: environments as Gaussians
+  // what all else is lit by: environments as Gaussians, rectangles in parts
+  std::span<const Light> lights_;
   Rgb background_;
   PrecomputedSettings settings_;
-  std::vector<const FabricPack*> packs_;                        // [part of the scene]
-  std::vector<MultipleScattering::LightShape> shapes_;          // [light]
+  std::vector<const FabricPack*> packs_;                // [part of the scene]
+  std::vector<MultipleScattering::LightShape> shapes_;  // [light]
+  LightShapes near_shapes_;
   std::vector<std::shared_ptr<const FabricShading>> shadings_;  // [part of the scene]
   // [part of the scene] own_yarn_scatterings(), where yarns have tints
   std::vector<std::optional<Rgb>> own_scatterings_;

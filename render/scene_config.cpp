@@ -6,12 +6,11 @@
 #include <array>
 #include <cmath>
 #include <map>
-#include <memory>
 #include <string_view>
 
 #include "formats/image_file.h"
 #include "formats/srgb_color.h"
-#include "render/environment_map.h"
+#include "render/light_config.h"
 #include "render/surface/surface_presets.h"
 
 namespace heddle {
@@ -27,12 +26,6 @@ constexpr std::size_t kMaxPatternFabrics = 256;
 
 Vec3d vector_of(const std::array<double, 3>& values) {
   return {values[0], values[1], values[2]};
-}
-
-Vec3d unit_vector(const TomlTable& table, std::string_view key) {
-  const Vec3d value = vector_of(table.number3(key, kComponent));
-  if (value.norm() < 1e-9) table.fail(key, "expected a direction, not the zero vector");
-  return value.normalized();
 }
 
 Rgb color(const std::array<double, 3>& values) {
@@ -111,32 +104,6 @@ std::string read_view_name(const TomlTable& table, const SceneConfig& scene) {
     if (view.name == name) table.fail("name", "expected a name that no other view has");
   }
   return name;
-}
-
-Light read_light(const TomlTable& table, std::vector<std::filesystem::path>& environment_files) {
-  Light light;
-  const std::string type = table.choice("type", {"directional", "sg", "environment"});
-  if (type == "environment") {
-    light.type = LightType::kEnvironment;
-    const std::filesystem::path file = table.existing_file("map");
-    environment_files.push_back(file);
-    light.map = std::make_shared<const EnvironmentMap>(EnvironmentMap::read(file));
-    const double turn = radians(table.number("turn_deg", {-360, 360}, 0.0));
-    light.axis = Vec3d(std::cos(turn), std::sin(turn), 0).cast<float>();
-    light.irradiance = color(table.number3("scale", kLight, std::array<double, 3>{1, 1, 1}));
-    light.gaussians = static_cast<int>(table.integer("gaussians", 1, 128, 16));
-    return light;
-  }
-  if (type == "directional") {
-    light.type = LightType::kDirectional;
-    light.axis = unit_vector(table, "direction").cast<float>();
-  } else {
-    light.type = LightType::kSphericalGaussian;
-    light.axis = unit_vector(table, "axis").cast<float>();
-    light.sharpness = static_cast<float>(table.number("sharpness", {0, 1e6}));
-  }
-  light.irradiance = color(table.number3("irradiance", kLight));
-  return light;
 }
 
 MeshFile read_mesh(const TomlTable& table) {
@@ -331,7 +298,7 @@ SceneConfig read_scene_config(const TomlTable& document) {
   scene.name = document.string("name");
   scene.background = color(document.number3("background", kLight, std::array<double, 3>{0, 0, 0}));
   for (const TomlTable& table : document.tables("light"))
-    scene.lights.push_back(read_light(table, scene.environment_files));
+    scene.lights.push_back(read_light(table, scene.light_files));
   if (scene.lights.empty()) document.fail("light", "expected at least one [[light]]");
   for (const TomlTable& table : document.tables("cloth")) scene.cloths.push_back(read_cloth(table));
   if (scene.cloths.empty()) document.fail("cloth", "expected at least one [[cloth]]");

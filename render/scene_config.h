@@ -111,7 +111,7 @@ struct SceneConfig {
   std::string name;
   std::vector<ViewConfig> views;  // that of [camera] first, then every [[view]]
   std::vector<Light> lights;
-  std::vector<std::filesystem::path> environment_files;  // that the lights were read from
+  std::vector<std::filesystem::path> light_files;  // pictures that the lights were read from
   Rgb background = Rgb(0, 0, 0);  // radiance seen by eye rays that hit nothing; lights nothing
   std::vector<ClothConfig> cloths;
   std::vector<MeshFile> meshes;  // black

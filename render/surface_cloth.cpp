@@ -1,6 +1,7 @@
 #include "render/surface_cloth.h"
 
 #include <algorithm>
+#include <limits>
 #include <optional>
 #include <utility>
 
@@ -101,35 +102,42 @@ Rgb surface_direct_light(const SurfaceHit& hit, const Vec3& wo, std::span<const 
   const Mat3d patch_from_world = hit.world_from_patch.transpose();
   const Vec3d local_out = patch_from_world * wo.cast<double>();
   Rgb sum = Rgb::Zero();
-  bool any_gaussian = false;
+  bool any_to_meet = false;
   for (const Light& light : lights) {
-    any_gaussian = any_gaussian || !light.is_directional();
+    any_to_meet = any_to_meet || !light.is_delta();
     if (estimator == LightEstimator::kEscapes) continue;
-    const LightSample incoming = sample_light(light, random);
+    const LightSample incoming = sample_light(light, hit.position, random);
     const Vec3d local_in = patch_from_world * incoming.direction.cast<double>();
     Rgb value = incoming.weight * model.reflected(hit.point, local_in, local_out).cast<float>();
     if ((value == 0).all()) continue;
-    if (estimator == LightEstimator::kCombined && !light.is_directional()) {
+    if (estimator == LightEstimator::kCombined && !light.is_delta()) {
       value *= power_heuristic(
           incoming.pdf, model.pdf(hit.point, local_in.cast<float>(), local_out.cast<float>()));
     }
-    if (open(incoming.direction)) sum += value;
+    if (open(incoming.direction, incoming.distance)) sum += value;
   }
-  if (!any_gaussian || estimator == LightEstimator::kShadowRays) return sum;
+  if (!any_to_meet || estimator == LightEstimator::kShadowRays) return sum;
 
   const std::optional<SurfaceSample> sample =
       model.sample(hit.point, local_out.cast<float>(), random);
   if (!sample) return sum;
   const Vec3 direction = (hit.world_from_patch * sample->wi.cast<double>()).cast<float>();
-  Rgb radiance = Rgb::Zero();
+  const auto weight = [&](float pdf) {
+    return estimator == LightEstimator::kCombined ? power_heuristic(sample->pdf, pdf) : 1.0F;
+  };
+  Rgb radiance = Rgb::Zero();  // from infinity
   for (const Light& light : lights) {
-    const float weight = estimator == LightEstimator::kCombined
-                             ? power_heuristic(sample->pdf, light_pdf(light, direction))
-                             : 1;
-    radiance += weight * light_radiance(light, direction);
+    if (!light.is_near()) {
+      radiance += weight(light_pdf(light, direction)) * light_radiance(light, direction);
+      continue;
+    }
+    const std::optional<MetLight> met = meet_light(light, hit.position, direction);
+    if (!met) continue;
+    const Rgb value = sample->weight * (weight(met->pdf) * met->radiance);
+    if (!(value == 0).all() && open(direction, met->distance)) sum += value;
   }
   const Rgb value = sample->weight * radiance;
-  if (!(value == 0).all() && open(direction)) sum += value;
+  if (!(value == 0).all() && open(direction, std::numeric_limits<double>::infinity())) sum += value;
   return sum;
 }
 

@@ -63,12 +63,12 @@ class SurfaceCloth {
   std::vector<Vec3d> bitangents_;  // [vertex] the same of v
 };
 
-/// Is the hit point open towards a world direction?
-using OpenTowards = std::function<bool(const Vec3& direction)>;
+/// Is the hit point open towards a world direction for so many mm?
+using OpenTowards = std::function<bool(const Vec3& direction, double distance)>;
 
 /// Radiance towards `wo` (world) of light that arrives straight from the lights. It takes one
 /// shadow ray per light. One more, for a direction drawn from the model, stands for all Gaussian
-/// lights.
+/// lights and environments, and one for every near light that the direction meets.
 Rgb surface_direct_light(const SurfaceHit& hit, const Vec3& wo, std::span<const Light> lights,
                          LightEstimator estimator, RandomStream& random, const OpenTowards& open);
 

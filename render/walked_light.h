@@ -2,8 +2,9 @@
 #define HEDDLE_RENDER_WALKED_LIGHT_H_
 // Light that one path brings back along the way it was walked: by shadow rays at every vertex and
 // by the path's escape, weighed against each other by the power heuristic (Veach 1997). Shared by
-// the path tracer of scenes (ClothTrace) and of flat swatches (TileTrace). Tested in
-// tests/render/path_tracer_test.cpp.
+// the path tracer of scenes (ClothTrace) and of flat swatches (TileTrace). Scattered rays find near
+// lights on their way too, whatever lies beyond. Tested in tests/render/path_tracer_test.cpp and
+// tests/render/near_lights_test.cpp.
 
 #include <algorithm>
 #include <cmath>
@@ -18,7 +19,8 @@
 namespace heddle {
 
 /// Light that leaves `vertex` towards `wo`. A Trace of path_walk.h, which also answers
-/// `escapes(vertex, direction)`. A Vertex may have `is_end`: the path brings nothing from there.
+/// `position(vertex)`, and `escapes(vertex, direction, distance)`: is the way clear for so many mm?
+/// A Vertex may have `is_end`: the path brings nothing from there.
 template <class Trace>
 EyeSample walked_light(const Trace& trace, std::span<const BcsdfTable> materials,
                        std::span<const Light> lights, LightEstimator estimator,
@@ -34,21 +36,32 @@ EyeSample walked_light(const Trace& trace, std::span<const BcsdfTable> materials
     const BcsdfTable& bcsdf = materials[at.material];
     const Vec3 local_out = frame.transpose() * out;
     for (const Light& light : lights) {
-      const LightSample incoming = sample_light(light, random);
+      const LightSample incoming = sample_light(light, trace.position(at), random);
       const Vec3 local_in = frame.transpose() * incoming.direction;
       const float cosine = std::sqrt(std::max(0.0F, 1.0F - local_in.x() * local_in.x()));
       Rgb value = throughput * incoming.weight * bcsdf.evaluate(local_in, local_out) * cosine;
       if constexpr (requires { at.tint; }) value *= at.tint;
       if (!(value.maxCoeff() > 0)) continue;
-      if (estimator == LightEstimator::kCombined && !light.is_directional())
+      if (estimator == LightEstimator::kCombined && !light.is_delta())
         value *= power_heuristic(incoming.pdf, bcsdf.pdf(local_in, local_out, throughput));
-      if (!trace.escapes(at, incoming.direction)) continue;
+      if (!trace.escapes(at, incoming.direction, incoming.distance)) continue;
       (scattering == 1 ? sample.single : sample.multiple) += value;
     }
     return true;
   };
-  const std::optional<PathEscape> escape =
-      walk_path(trace, materials, vertex, wo, Rgb(1, 1, 1), random, limits, by_shadow_rays);
+  const auto on_the_way = [&](const auto& from, const Vec3& direction, const Rgb& throughput,
+                              float pdf, int scattering) {
+    if (estimator == LightEstimator::kShadowRays) return;
+    for (const Light& light : lights) {
+      const std::optional<MetLight> met = meet_light(light, trace.position(from), direction);
+      if (!met || !trace.escapes(from, direction, met->distance)) continue;
+      Rgb value = throughput * met->radiance;
+      if (estimator == LightEstimator::kCombined) value *= power_heuristic(pdf, met->pdf);
+      (scattering == 1 ? sample.single : sample.multiple) += value;
+    }
+  };
+  const std::optional<PathEscape> escape = walk_path(trace, materials, vertex, wo, Rgb(1, 1, 1),
+                                                     random, limits, by_shadow_rays, on_the_way);
   if (!escape || estimator == LightEstimator::kShadowRays) return sample;
   Rgb light_sum = Rgb::Zero();
   for (const Light& light : lights) {

@@ -18,7 +18,33 @@ Eigen::Map<const RowMajorMatrix> matrix_at(const std::vector<float>& values, std
   return {values.data() + index * static_cast<std::size_t>(rows * columns), rows, columns};
 }
 
+/// result [j1][rgb] += factor times the sum over j0 of light [j0][rgb] matrix [j0][j1][rgb].
+void add_colored_product(float factor, const float* light, const float* matrix, int n,
+                         float* result) {
+  // Four coefficients in three colours fill whole vectors.
+  using Lanes = Eigen::Array<float, 12, 1>;
+  const int whole = 3 * n / 12 * 12;
+  for (int j0 = 0; j0 < n; ++j0, light += 3, matrix += 3 * n) {
+    const Eigen::Array3f color = factor * Eigen::Map<const Eigen::Array3f>(light);
+    const Lanes colors = color.replicate<4, 1>();
+    for (int k = 0; k < whole; k += 12)
+      Eigen::Map<Lanes>(result + k) += colors * Eigen::Map<const Lanes>(matrix + k);
+    for (int k = whole; k < 3 * n; ++k) result[k] += color[k % 3] * matrix[k];
+  }
+}
+
 }  // namespace
+
+void Transfer::add_incoming(std::uint32_t cell, const float* light, float* result) const {
+  const int n = coefficients();
+  add_colored_product(1, light, matrix_at(matrices, cell, n, 3 * n).data(), n, result);
+}
+
+void Transfer::subtract_incoming_of_cones(std::uint32_t cell, const float* light,
+                                          float* result) const {
+  const int n = coefficients();
+  add_colored_product(-1, light, matrix_at(cones->harmonics, cell, n, 3 * n).data(), n, result);
+}
 
 void Transfer::incoming(std::uint32_t cell, const float* light, float* result) const {
   const int n = coefficients();

@@ -40,6 +40,10 @@ struct Transfer {
   void incoming(std::uint32_t cell, const float* light, float* result) const;
   /// The same less `cone_share` of what the cones model.
   void incoming(std::uint32_t cell, const float* light, float cone_share, float* result) const;
+  /// Light in colours: adds c_T of light [j0][rgb] to `result` [j1][rgb].
+  void add_incoming(std::uint32_t cell, const float* light, float* result) const;
+  /// Takes what the cones model of such light from `result`. Needs `cones`.
+  void subtract_incoming_of_cones(std::uint32_t cell, const float* light, float* result) const;
   /// Light on the cones: light [j0] -> [width][azimuth][rgb]. Needs `cones`.
   void incoming_on_cones(std::uint32_t cell, const float* light, float* result) const;
 };

@@ -41,6 +41,21 @@ double sg_depth_of_share(double share, double sharpness) {
   return std::min(2.0, -std::log1p(share * std::expm1(-2.0 * sharpness)) / sharpness);
 }
 
+double sg_sharpness_of_mean_depth(double depth) {
+  if (depth >= 1) return 0;
+  // Start: Banerjee et al. 2005, equation 4.4, within 3 %. Then Newton's steps.
+  const double mean = 1 - depth;
+  double sharpness = mean * (3 - mean * mean) / (depth * (1 + mean));
+  if (sharpness < 1e-3) return sharpness;  // where the function below cancels
+  for (int step = 0; step < 4; ++step) {
+    const double grown = std::expm1(2 * std::min(sharpness, 300.0));
+    const double excess = 1 / sharpness - 2 / grown - depth;
+    const double slope = -1 / (sharpness * sharpness) + 4 / grown * (1 + 1 / grown);
+    sharpness = std::max(sharpness - excess / slope, 1e-4);
+  }
+  return sharpness;
+}
+
 SgProduct sg_product(const SphericalGaussian& a, const SphericalGaussian& b) {
   const Vec3d sum = a.sharpness * a.axis + b.sharpness * b.axis;
   const double length = sum.norm();

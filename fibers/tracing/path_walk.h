@@ -41,15 +41,22 @@ struct PathEscape {
   float variance;
 };
 
+/// For walks that have no use for scattered rays.
+struct IgnoreRay {
+  template <class Vertex>
+  void operator()(const Vertex&, const Vec3&, const Rgb&, float, int) const {}
+};
+
 /// Follows the path that arrives at `vertex` and leaves it towards `wo` with the given throughput.
 /// at_vertex(vertex, frame, wo, throughput, n) is called at each vertex before scattering event n =
 /// 1, 2, .... The path ends there if it returns false. frame has the fiber frame's axes as columns
-/// (x = tangent). Returns where the path escaped, or nothing if it was absorbed or ended.
-template <class Trace, class AtVertex>
+/// (x = tangent). on_ray(vertex, direction, throughput, pdf, n) is called for the ray that event n
+/// sends on. Returns where the path escaped, or nothing if it was absorbed or ended.
+template <class Trace, class AtVertex, class OnRay = IgnoreRay>
 std::optional<PathEscape> walk_path(const Trace& trace, std::span<const BcsdfTable> materials,
                                     typename Trace::Vertex vertex, Vec3 wo, Rgb throughput,
                                     RandomStream& random, const WalkLimits& limits,
-                                    AtVertex&& at_vertex) {
+                                    AtVertex&& at_vertex, OnRay&& on_ray = {}) {
   float variance = 0;
   for (int n = 1; n <= limits.max_scatterings; ++n) {
     const Mat3 frame = frame_about(vertex.tangent);
@@ -67,6 +74,7 @@ std::optional<PathEscape> walk_path(const Trace& trace, std::span<const BcsdfTab
       return {};
     }
     const Vec3 wi = frame * sample.wi;
+    on_ray(vertex, wi, throughput, sample.pdf, n);
     std::optional<typename Trace::Vertex> next = trace.next(vertex, wi);
     if (!next) return PathEscape{wi, throughput, sample.pdf, n, variance};
     vertex = *next;

@@ -3,6 +3,7 @@
 // The flat, endless cloth as a Trace for walk_path (fabric space is the space of directions).
 
 #include <cstdint>
+#include <limits>
 #include <optional>
 
 #include "fibers/tracing/tile_scene.h"
@@ -28,8 +29,12 @@ class TileTrace {
   std::optional<Vertex> next(const Vertex& from, const Vec3& direction) const {
     return query(from.position, direction, from.fiber);
   }
-  bool escapes(const Vertex& from, const Vec3& direction) const {
-    return !scene_->occluded({from.position, direction}, from.fiber);
+  Vec3d position(const Vertex& vertex) const { return vertex.position.cast<double>(); }
+  /// Does a ray meet no fiber within `distance`?
+  bool escapes(const Vertex& from, const Vec3& direction,
+               double distance = std::numeric_limits<double>::infinity()) const {
+    return !scene_->occluded({from.position, direction, 0, static_cast<float>(distance)},
+                             from.fiber);
   }
   /// A vertex on a given segment.
   Vertex at(const Vec3& position, std::uint32_t segment) const {

@@ -27,8 +27,8 @@ std::string short_duration(double seconds) {
 /// Which form of visibility a way takes for a light.
 const char* visibility_of(const Way& way, const Light& light) {
   if (!is_precomputed(way.settings.method)) return "none";
-  if (light.type == LightType::kEnvironment) return "by the sharpness of its Gaussians";
-  if (light.is_directional()) return "signed distances";
+  if (light.is_delta()) return "signed distances";
+  if (light.type != LightType::kSphericalGaussian) return "by the sharpness of its Gaussians";
   const bool distance = way.settings.variant.blend.uses_distance(light.sharpness);
   const bool lobes = way.settings.variant.blend.uses_lobes(light.sharpness);
   if (distance && lobes) return "signed distances and Gaussians";
@@ -36,9 +36,21 @@ const char* visibility_of(const Way& way, const Light& light) {
 }
 
 std::string light_name(const Light& light) {
-  if (light.type == LightType::kEnvironment) return "environment";
-  return light.is_directional() ? "directional"
-                                : fmt::format("sg, sharpness {:g}", light.sharpness);
+  switch (light.type) {
+    case LightType::kDirectional:
+      return "directional";
+    case LightType::kSphericalGaussian:
+      return fmt::format("sg, sharpness {:g}", light.sharpness);
+    case LightType::kEnvironment:
+      return "environment";
+    case LightType::kPoint:
+      return "point";
+    case LightType::kSphere:
+      return "sphere";
+    case LightType::kRectangle:
+      return "rectangle";
+  }
+  return "";
 }
 
 /// How a way draws a cloth.

@@ -45,7 +45,9 @@ struct SeenCloth {
 };
 
 struct ViewFacts {
-  std::vector<Light> lights;       // of the scene, environments as Gaussians
+  // of the scene, environments as Gaussians, near lights as what stands for them in the middle of
+  // the cloth that is seen
+  std::vector<Light> lights;
   std::vector<SeenCloth> cloths;   // [cloth of the scene]
   bool sends_light_about = false;  // light that has left a cloth can meet cloth again
 };

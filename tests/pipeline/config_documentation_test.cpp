@@ -255,7 +255,10 @@ TEST(ConfigDocumentation, NamesEveryKeyOfAScene) {
   const std::string more =
       "[[mesh]]\nmesh = \"../meshes/drape_sphere_64.obj\"\nmesh_unit = \"m\"\n"
       "[[cloth]]\nflat_mm = [1, 1]\nfabric = \"../fabrics/cotton-tiny.toml\"\nfar_surface = "
-      "\"silk-shot\"\n";
+      "\"silk-shot\"\n"
+      "[[light]]\ntype = \"sphere\"\nposition_mm = [0, 0, 9]\nradius_mm = 1\nradiance = [1, 1, 1]\n"
+      "[[light]]\ntype = \"rectangle\"\nposition_mm = [0, 9, 9]\nlook_at_mm = [0, 0, 0]\nsize_mm = "
+      "[1, 1]\nradiance = [1, 1, 1]\ntexture = \"../maps/sky_128.hdr\"\n";
   std::ifstream stream(kConfigs / "scenes" / "ci.toml");
   std::stringstream text;
   text << stream.rdbuf() << more;

@@ -48,7 +48,7 @@ TEST(LightsLaw, WeightTimesDensityIsRadiance) {
   for (const float sharpness : {0.0F, 5.0F, 150.0F}) {
     const Light light = sg_light(sharpness);
     for (int k = 0; k < 100; ++k) {
-      const LightSample sample = sample_light(light, random);
+      const LightSample sample = sample_light(light, Vec3d::Zero(), random);
       EXPECT_NEAR(sample.pdf, light_pdf(light, sample.direction), 1e-5F * sample.pdf);
       const Rgb radiance = light_radiance(light, sample.direction);
       EXPECT_NEAR(radiance[1], sample.weight[1] * sample.pdf, 1e-5F * radiance[1]);
@@ -61,7 +61,7 @@ TEST(Lights, DirectionalLightIsFoundOnlyBySampling) {
   light.axis = Vec3(0, 0.6F, 0.8F);
   light.irradiance = {1, 2, 3};
   RandomStream random(1, RandomStage::kTest, 0, 0);
-  const LightSample sample = sample_light(light, random);
+  const LightSample sample = sample_light(light, Vec3d::Zero(), random);
   EXPECT_EQ(sample.direction, light.axis);
   EXPECT_EQ(sample.weight[2], 3);
   EXPECT_EQ(sample.pdf, 0);
@@ -95,7 +95,7 @@ TEST(LightsLaw, AnEnvironmentsWeightTimesDensityIsRadiance) {
   const Light light = environment(35);
   RandomStream random(1, RandomStage::kTest, 0, 0);
   for (int k = 0; k < 200; ++k) {
-    const LightSample sample = sample_light(light, random);
+    const LightSample sample = sample_light(light, Vec3d::Zero(), random);
     EXPECT_NEAR(sample.pdf, light_pdf(light, sample.direction), 1e-4F * sample.pdf);
     const Rgb radiance = light_radiance(light, sample.direction);
     EXPECT_NEAR(radiance[1], sample.weight[1] * sample.pdf, 1e-4F * radiance[1]);

@@ -48,6 +48,13 @@ TEST(Needs, FollowTheLights) {
   Light environment;
   environment.type = LightType::kEnvironment;
   EXPECT_TRUE(needs({environment}).ssdf && needs({environment}).sgs);
+  Light near;
+  near.type = LightType::kPoint;
+  EXPECT_TRUE(needs({near}).ssdf && !needs({near}).sgs);
+  for (const LightType type : {LightType::kSphere, LightType::kRectangle}) {
+    near.type = type;
+    EXPECT_TRUE(needs({near}).ssdf && needs({near}).sgs);  // near or far: soft or sharp
+  }
 }
 
 TEST(Needs, FollowTheBlend) {

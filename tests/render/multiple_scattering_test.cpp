@@ -342,18 +342,46 @@ TEST(MultipleScatteringAgreement, LightOnConesEqualsQuadratureOfItsModel) {
   }
 }
 
+TEST(LightShapesAgreement, InterpolatesBetweenSharpnesses) {
+  using LightShape = MultipleScattering::LightShape;
+  const LightShapes shapes(LightShape::FaceLight::kDual);
+  double worst = 0;
+  for (const float sharpness : {1.2F, 3.4F, 9.5F, 27.0F, 76.0F, 400.0F, 3000.0F}) {
+    const LightShape exact(sharpness);
+    for (const bool both_sides : {false, true}) {
+      for (int i = 0; i < 20; ++i) {
+        RandomStream random(5, RandomStage::kTest, 0, static_cast<std::uint64_t>(i));
+        const Vec3 axis = sample_sphere(random);
+        std::array<float, sh_count(5)> expected;
+        std::array<float, sh_count(5)> got;
+        exact.moments(5, both_sides, axis, expected.data());
+        shapes.moments(5, both_sides, sharpness, axis, got.data());
+        double largest = 0.28;  // that of a constant
+        double difference = 0;
+        for (std::size_t j = 0; j < got.size(); ++j) {
+          largest = std::max(largest, static_cast<double>(std::abs(expected[j])));
+          difference = std::max(difference, static_cast<double>(std::abs(got[j] - expected[j])));
+        }
+        worst = std::max(worst, difference / largest);
+      }
+    }
+  }
+  std::printf("  worst: %.2g\n", worst);
+  EXPECT_LT(worst, 5e-3);
+}
+
 TEST(MultipleScatteringLaw, SoftAndPrintedLightsLeaveConesInTheHarmonics) {
   using LightShape = MultipleScattering::LightShape;
-  EXPECT_EQ(LightShape(std::nullopt).cone_share(), 1);
-  EXPECT_EQ(LightShape(1000.0F).cone_share(), 1);
-  EXPECT_EQ(LightShape(5.0F).cone_share(), 0);
-  EXPECT_EQ(LightShape(8.0F).cone_share(), 0);
-  EXPECT_FLOAT_EQ(LightShape(14.0F).cone_share(), 0.5F);
-  EXPECT_EQ(LightShape(20.0F).cone_share(), 1);
-  EXPECT_EQ(LightShape(std::nullopt, LightShape::FaceLight::kPrinted).cone_share(), 0);
+  EXPECT_EQ(LightShape(std::nullopt).on_cones().share, 1);
+  EXPECT_EQ(LightShape(1000.0F).on_cones().share, 1);
+  EXPECT_EQ(LightShape(5.0F).on_cones().share, 0);
+  EXPECT_EQ(LightShape(8.0F).on_cones().share, 0);
+  EXPECT_FLOAT_EQ(LightShape(14.0F).on_cones().share, 0.5F);
+  EXPECT_EQ(LightShape(20.0F).on_cones().share, 1);
+  EXPECT_EQ(LightShape(std::nullopt, LightShape::FaceLight::kPrinted).on_cones().share, 0);
   float last = 0;
   for (float sharpness = 5; sharpness < 25; sharpness += 0.5F) {
-    const float share = LightShape(sharpness).cone_share();
+    const float share = LightShape(sharpness).on_cones().share;
     EXPECT_GE(share, last);
     EXPECT_LT(share - last, 0.05F);  // no step
     last = share;

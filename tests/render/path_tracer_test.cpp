@@ -9,8 +9,10 @@
 #include "fibers/cloth/synthesize.h"
 #include "fibers/math/quadrature.h"
 #include "fibers/math/spherical_gaussian.h"
+#include "render/radiance_picture.h"
 #include "tests/support/fabrics.h"
 #include "tests/support/fibers.h"
+#include "tests/support/near_lights.h"
 #include "tests/support/pictures.h"
 #include "tests/support/small_exemplars.h"
 #include "tests/support/statistics.h"
@@ -182,6 +184,105 @@ TEST(PathTracerStatistical, AVerySharpGaussianIsADirectionalLight) {
     EXPECT_TRUE(means_agree("sharp against directional", a.total[c].mean(),
                             a.total[c].standard_error(), b.total[c].mean(),
                             b.total[c].standard_error(), 3));
+  }
+}
+
+// Near enough that its direction and brightness change along a path, and wide enough to be met.
+TEST(PathTracerStatistical, EstimatorsAgreeUnderNearLights) {
+  for (const Light& light :
+       {test::sphere_light({-2, 1, 4}, 1.5, Rgb(3, 3, 3)),
+        test::rectangle_light({-2, 1, 4}, {0.4, -0.2, -1}, {0, 1, 0}, 4, 2, Rgb(3, 3, 3))}) {
+    const World world = make_world(crossed_layers(test_cotton()), {curved_patch()}, {light});
+    const Means shadow = measure(world.tracer(LightEstimator::kShadowRays), 30000, 4);
+    const Means escapes = measure(world.tracer(LightEstimator::kEscapes), 60000, 5);
+    const Means combined = measure(world.tracer(LightEstimator::kCombined), 30000, 6);
+    const auto agree = [&](const char* name, const RunningMean& a, const RunningMean& b) {
+      EXPECT_TRUE(means_agree(name, a.mean(), a.standard_error(), b.mean(), b.standard_error(), 6));
+    };
+    agree("shadow rays, combined", shadow.total[0], combined.total[0]);
+    agree("escapes, combined", escapes.total[0], combined.total[0]);
+    agree("single: escapes, combined", escapes.single[0], combined.single[0]);
+  }
+}
+
+TEST(PathTracerAgreement, FarAwayANearLightIsOneAtInfinity) {
+  const Vec3d axis = Vec3d(-0.4, 0.3, 1).normalized();
+  const Rgb irradiance(2, 3, 4);
+  const auto tracer_mean = [&](const Light& light, std::uint64_t seed) {
+    const World world = make_world(crossed_layers(test_cotton()), {curved_patch()}, {light});
+    return measure(world.tracer(LightEstimator::kCombined), 20000, seed);
+  };
+  // 1000 times as far as the cloth is wide: the same random numbers, nearly the same light.
+  const Means directional =
+      tracer_mean({LightType::kDirectional, axis.cast<float>(), 0, irradiance}, 8);
+  const Means point = tracer_mean(test::point_light(6000 * axis, 36 * irradiance), 8);
+  for (int c = 0; c < 3; ++c)
+    EXPECT_NEAR(point.total[c].mean() / directional.total[c].mean(), 1, 2e-3);
+  // A sphere of 2 degrees, and the Gaussian of its mean cosine.
+  const Light sphere = test::sphere_light(6000 * axis, 200, irradiance);
+  const SeenLight seen = seen_from(sphere, {0, 0, 0});
+  const Means near = tracer_mean(sphere, 9);
+  const Means gaussian =
+      tracer_mean(test::sg_light(seen.axis, seen.sharpness, seen.irradiance), 10);
+  for (int c = 0; c < 3; ++c) {
+    EXPECT_TRUE(means_agree("sphere, Gaussian", near.total[c].mean(),
+                            near.total[c].standard_error(), gaussian.total[c].mean(),
+                            gaussian.total[c].standard_error(), 3));
+  }
+}
+
+TEST(PathTracerLaw, AnEvenTextureIsNone) {
+  Light light = test::rectangle_light({-2, 1, 4}, {0.4, -0.2, -1}, {0, 1, 0}, 4, 2, Rgb(3, 3, 3));
+  const World plain = make_world(crossed_layers(test_cotton()), {curved_patch()}, {light});
+  light.texture = std::make_shared<const RadiancePicture>(
+      RadiancePicture{3, 2, std::vector<Rgb>(6, Rgb(1, 1, 1))});
+  const World textured = make_world(crossed_layers(test_cotton()), {curved_patch()}, {light});
+  const Means a = measure(plain.tracer(LightEstimator::kCombined), 500, 4);
+  const Means b = measure(textured.tracer(LightEstimator::kCombined), 500, 4);
+  EXPECT_GT(a.total[0].mean(), 0);
+  EXPECT_EQ(a.total[0].mean(), b.total[0].mean());
+}
+
+// A black roof hides what is above it and not what is below.
+TEST(PathTracerLaw, ShadowRaysEndAtANearLight) {
+  const TriangleMesh roof = {
+      {Vec3(-50, -50, 3), Vec3(50, -50, 3), Vec3(50, 50, 3), Vec3(-50, 50, 3)},
+      {{0, 1, 2}, {0, 2, 3}}};
+  const auto light_at = [](int which, double z) {
+    if (which == 0) return test::point_light({0, 0, z}, Rgb(1, 1, 1));
+    if (which == 1) return test::sphere_light({0, 0, z}, 0.5, Rgb(1, 1, 1));
+    return test::rectangle_light({0, 0, z}, {0, 0, -1}, {0, 1, 0}, 2, 2, Rgb(1, 1, 1));
+  };
+  for (int which = 0; which < 3; ++which) {
+    for (const double z : {2.0, 4.0}) {
+      World open =
+          make_world(crossed_layers(test_cotton()), {flat_cloth(6, 6)}, {light_at(which, z)});
+      std::vector<ClothPiece> pieces;
+      pieces.push_back(
+          {std::make_shared<TileScene>(crossed_layers(test_cotton())), flat_cloth(6, 6)});
+      World roofed =
+          make_world(crossed_layers(test_cotton()), {flat_cloth(6, 6)}, {light_at(which, z)});
+      roofed.scene =
+          std::make_unique<ClothScene>(std::move(pieces), std::vector<TriangleMesh>{roof});
+      // The eye is below the roof.
+      const auto seen = [&](const World& world) {
+        const PathTracer tracer = world.tracer(LightEstimator::kCombined);
+        double sum = 0;
+        for (std::uint64_t k = 0; k < 200; ++k) {
+          RandomStream random(1, RandomStage::kTest, k, 0);
+          const Vec3 direction = Vec3(0.1F, 0.2F, -1).normalized();
+          sum += static_cast<double>(
+              tracer.trace({Vec3d(0.3, 0.2, 2.5), direction}, random).single[0]);
+        }
+        return sum;
+      };
+      EXPECT_GT(seen(open), 0);
+      if (z > 3) {
+        EXPECT_EQ(seen(roofed), 0) << which;
+      } else {
+        EXPECT_NEAR(seen(roofed) / seen(open), 1, 1e-6) << which;
+      }
+    }
   }
 }
 

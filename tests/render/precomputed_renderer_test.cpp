@@ -10,6 +10,7 @@
 #include "fibers/math/sampling.h"
 #include "formats/input_error.h"
 #include "tests/support/fibers.h"
+#include "tests/support/near_lights.h"
 #include "tests/support/pictures.h"
 #include "tests/support/small_exemplars.h"
 
@@ -452,6 +453,149 @@ TEST(PrecomputedRendererEndToEnd, SameBytesForAnyThreadsAndCrop) {
       ASSERT_TRUE((one.variance[whole] == crop.variance[part]).all());
     }
   }
+}
+
+/// Transfer of random numbers of order 3, with or without cones.
+FabricPack random_pack(bool both_sides, bool cones) {
+  FabricPack pack = open_pack(test_cotton(), both_sides);
+  Transfer& transfer = *pack.transfer;
+  transfer.order = 3;
+  RandomStream random(1, RandomStage::kTest, 0, 0);
+  transfer.matrices.resize(std::size_t{16} * 16 * 3);
+  for (float& value : transfer.matrices) value = random.uniform();
+  transfer.standard_error.assign(std::size_t{4} * 3, 0);
+  if (!cones) return pack;
+  transfer.cones.emplace();
+  transfer.cones->harmonics = transfer.matrices;
+  for (float& value : transfer.cones->harmonics) value *= 0.5F;
+  transfer.cones->moments.resize(std::size_t{ConeTransfer::kWidths} * 16 * ConeTransfer::kAzimuths *
+                                 3);
+  for (float& value : transfer.cones->moments) value = random.uniform();
+  for (std::uint32_t k = 0; k < pack.exemplar.segment_count(); ++k)
+    pack.bundle_tangent.push_back(pack.exemplar.segment_tangent(k));
+  return pack;
+}
+
+double largest_difference(const std::vector<Rgb>& a, const std::vector<Rgb>& b) {
+  double difference = 0;
+  double largest = 0;
+  for (std::size_t k = 0; k < a.size(); ++k) {
+    difference = std::max(difference, static_cast<double>((a[k] - b[k]).abs().maxCoeff()));
+    largest = std::max(largest, static_cast<double>(b[k].abs().maxCoeff()));
+  }
+  return difference / largest;
+}
+
+// Near lights are summed before the transfer, lights at infinity after it.
+TEST(PrecomputedRendererAgreement, FarAwayNearLightsAreThoseAtInfinity) {
+  const Vec3d axis = Vec3d(-0.4, 0.3, 1).normalized();
+  const Vec3d other = Vec3d(0.6, 0.1, 1).normalized();
+  const Rgb irradiance(2, 3, 4);
+  const auto shown = [](const PackWorld& world) {
+    return shade_picture(world.renderer(), camera_above(1, 16, 16), {0, 0, 16, 16}, 2,
+                         test::no_progress);
+  };
+  for (const bool both_sides : {false, true}) {
+    for (const bool cones : {false, true}) {
+      const FabricPack pack = random_pack(both_sides, cones);
+      const FrameBuffers far = shown(
+          *make_world(pack, {{LightType::kDirectional, axis.cast<float>(), 0, irradiance},
+                             {LightType::kDirectional, other.cast<float>(), 0, Rgb(1, 0, 3)}}));
+      const FrameBuffers near =
+          shown(*make_world(pack, {test::point_light(1e5 * axis, 1e4 * irradiance),
+                                   test::point_light(1e5 * other, 1e4 * Rgb(1, 0, 3))}));
+      EXPECT_LT(largest_difference(near.single, far.single), 1e-3);
+      EXPECT_LT(largest_difference(near.multiple, far.multiple), 1e-3) << both_sides << cones;
+    }
+  }
+}
+
+TEST(PrecomputedRendererAgreement, ASphereIsTheGaussianThatStandsForIt) {
+  for (const bool cones : {false, true}) {
+    const FabricPack pack = random_pack(false, cones);
+    const Light sphere = test::sphere_light({-200, 150, 500}, 100, Rgb(3, 2, 1));
+    const SeenLight seen = seen_from(sphere, {0, 0, 0});
+    const auto shown = [&](const Light& light) {
+      return shade_picture(make_world(pack, {light})->renderer(), camera_above(1, 16, 16),
+                           {0, 0, 16, 16}, 2, test::no_progress);
+    };
+    const FrameBuffers near = shown(sphere);
+    const FrameBuffers far =
+        shown({LightType::kSphericalGaussian, seen.axis, seen.sharpness, seen.irradiance});
+    // 3 mm of 500 change the light by that.
+    EXPECT_LT(largest_difference(near.single, far.single), 0.01);
+    EXPECT_LT(largest_difference(near.multiple, far.multiple), 0.01);
+  }
+}
+
+TEST(PrecomputedRendererLaw, ShadowRaysEndAtANearLight) {
+  // The eye is under half a roof at z = 1, x > 0, and looks at the cloth there.
+  const auto brightness = [](const Light& light, bool roofed) {
+    const auto world =
+        make_world(open_pack(test_cotton()), {light},
+                   roofed ? std::vector<TriangleMesh>{half_roof()} : std::vector<TriangleMesh>{});
+    CameraConfig config;
+    config.position = Vec3d(1, -0.2, 0.8);
+    config.look_at = Vec3d(1, 0, 0);
+    config.fov = 0.5;
+    config.width = config.height = 16;
+    const FrameBuffers frame =
+        shade_picture(world->renderer(), Camera(config), {0, 0, 16, 16}, 2, test::no_progress);
+    Rgb sum = Rgb::Zero();
+    for (std::size_t k = 0; k < frame.pixel_count(); ++k)
+      sum += frame.single[k] + frame.multiple[k];
+    return sum[0];
+  };
+  for (int which = 0; which < 3; ++which) {
+    for (const double z : {0.7, 1.5}) {
+      const Light light = which == 0   ? test::point_light({1.2, 0, z}, Rgb(1, 1, 1))
+                          : which == 1 ? test::sphere_light({1.2, 0, z}, 0.2, Rgb(1, 1, 1))
+                                       : test::rectangle_light({1.2, 0, z}, {0, 0, -1}, {0, 1, 0},
+                                                               0.5, 0.5, Rgb(1, 1, 1));
+      const float open = brightness(light, false);
+      EXPECT_GT(open, 0);
+      EXPECT_EQ(brightness(light, true), z > 1 ? 0 : open) << which << ' ' << z;
+    }
+  }
+}
+
+TEST(PrecomputedRendererEndToEnd, SameBytesForAnyThreadsUnderNearLights) {
+  const auto world = make_world(
+      random_pack(false, true),
+      {test::point_light({1, 1, 3}, Rgb(1, 1, 1)), test::sphere_light({-1, 1, 3}, 1, Rgb(1, 1, 1)),
+       test::rectangle_light({0, -1, 4}, {0, 0, -1}, {0, 1, 0}, 3, 1, Rgb(1, 1, 1))},
+      {half_roof()});
+  const auto render = [&](std::size_t threads, RenderMethod method) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    PrecomputedSettings settings;
+    settings.method = method;
+    return shade_picture(world->renderer(settings), camera_above(2, 40, 32), {0, 0, 40, 32}, 2,
+                         test::no_progress);
+  };
+  for (const RenderMethod method :
+       {RenderMethod::kExact, RenderMethod::kPrinted, RenderMethod::kDualScattering}) {
+    const FrameBuffers one = render(1, method);
+    const FrameBuffers two = render(2, method);
+    double light = 0;
+    for (std::size_t k = 0; k < one.pixel_count(); ++k) {
+      ASSERT_TRUE((one.beauty[k] == two.beauty[k]).all());
+      light += static_cast<double>(one.single[k].sum());
+    }
+    EXPECT_GT(light, 0);
+  }
+}
+
+TEST(PrecomputedRenderer, RectanglesAreSplitByTheNearestCloth) {
+  Light light = test::rectangle_light({0, 0, 20}, {0, 0, -1}, {0, 1, 0}, 40, 10, Rgb(1, 1, 1));
+  const auto count = [&](const Light& own) {
+    return make_world(open_pack(test_cotton()), {own})->renderer().fitted_lights().lights.size();
+  };
+  EXPECT_EQ(count(light), 4U);  // 40 mm wide at 20 mm: parts of 10 mm
+  light.gaussians = 2;
+  EXPECT_EQ(count(light), 2U);
+  light.gaussians = 16;
+  light.position_mm.z() = 400;
+  EXPECT_EQ(count(light), 1U);
 }
 
 TEST(PrecomputedRenderer, SaysWhatThePackLacks) {

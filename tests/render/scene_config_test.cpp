@@ -6,6 +6,7 @@
 
 #include "formats/image_file.h"
 #include "formats/input_error.h"
+#include "render/radiance_picture.h"
 #include "render/surface/surface_presets.h"
 #include "tests/support/temporary_folder.h"
 
@@ -165,7 +166,7 @@ TEST_F(SceneConfigTest, MistakesAreLocated) {
       {"look_at_mm = [0, 0, 10]", "look_at_mm = [0, -400, 10]", "parallel"},
       {"direction = [0, 3, 4]", "direction = [0, 0, 0]", "scene.toml:11"},
       {"sharpness = 0", "sharpness = -1", "scene.toml:16"},
-      {"type = \"sg\"", "type = \"point\"", "scene.toml:14"},
+      {"type = \"sg\"", "type = \"cone\"", "scene.toml:14"},
       {"irradiance = [1, 2, 3]", "irradiance = [1, -2, 3]", "scene.toml:12"},
       {"mesh_unit = \"m\"\n", "", "mesh_unit"},
       {"mesh_unit = \"m\"", "mesh_unit = \"inch\"", "scene.toml:20"},
@@ -194,6 +195,76 @@ TEST_F(SceneConfigTest, MistakesAreLocated) {
   for (const Case& c : cases) {
     const std::string text = message(with(kScene, c.from, c.to));
     EXPECT_NE(text.find(c.expected), std::string::npos) << c.to << "\n" << text;
+  }
+}
+
+const std::string kNearLights = R"([[light]]
+type = "point"
+position_mm = [100, 200, 300]
+irradiance_at_1_m = [1, 2, 3]
+[[light]]
+type = "sphere"
+position_mm = [0, 0, 300]
+radius_mm = 20
+radiance = [4, 5, 6]
+[[light]]
+type = "rectangle"
+position_mm = [300, 0, 0]
+look_at_mm = [0, 0, 0]
+size_mm = [200, 100]
+radiance = [7, 8, 9]
+texture = "light.exr"
+gaussians = 9
+)";
+
+TEST_F(SceneConfigTest, ReadsNearLights) {
+  Image image{2, 1, {}, {}};
+  for (const char* name : {"R", "G", "B"}) image.channels[name].values = {1, 0.5F};
+  write_exr(folder_ / "light.exr", image);
+  const std::string text = kScene + kNearLights;
+  const SceneConfig scene = read(text);
+  ASSERT_EQ(scene.lights.size(), 5U);
+  const Light& point = scene.lights[2];
+  EXPECT_EQ(point.type, LightType::kPoint);
+  EXPECT_EQ(point.position_mm, Vec3d(100, 200, 300));
+  EXPECT_EQ(point.irradiance[1], 2);
+  const Light& sphere = scene.lights[3];
+  EXPECT_EQ(sphere.type, LightType::kSphere);
+  EXPECT_EQ(sphere.radius_mm, 20);
+  EXPECT_EQ(sphere.irradiance[2], 6);
+  const Light& rectangle = scene.lights[4];
+  EXPECT_EQ(rectangle.type, LightType::kRectangle);
+  EXPECT_EQ(rectangle.axis, Vec3(-1, 0, 0));
+  // Who looks at it from the origin, z up, has -y at the right.
+  EXPECT_LT((rectangle.half_right_mm - Vec3d(0, -100, 0)).norm(), 1e-9);
+  EXPECT_LT((rectangle.half_up_mm - Vec3d(0, 0, 50)).norm(), 1e-9);
+  EXPECT_EQ(rectangle.texture->pixel(0, 1)[0], 0.5F);
+  EXPECT_EQ(rectangle.gaussians, 9);
+  ASSERT_EQ(scene.light_files.size(), 1U);
+
+  struct Case {
+    const char* from;
+    const char* to;
+    const char* expected;
+  };
+  // kScene has 34 lines.
+  const Case cases[] = {
+      {"radius_mm = 20", "radius_mm = 0", "scene.toml:42:"},
+      {"radius_mm = 20", "radius_mm = -3", "radius_mm"},
+      {"size_mm = [200, 100]", "size_mm = [200, 0]", "scene.toml:48:"},
+      {"look_at_mm = [0, 0, 0]", "look_at_mm = [300, 0, 0]", "scene.toml:47:"},
+      {"look_at_mm = [0, 0, 0]", "look_at_mm = [300, 0, -9]", "parallel"},
+      {"look_at_mm = [0, 0, 0]", "look_at_mm = [0, 0, 0]\nup = [0, 0, 0]", "scene.toml:48:"},
+      {"texture = \"light.exr\"", "texture = \"none.exr\"", "scene.toml:50:"},
+      {"gaussians = 9", "gaussians = 0", "scene.toml:51:"},
+      {"position_mm = [100, 200, 300]\n", "", "position_mm"},
+      {"irradiance_at_1_m = [1, 2, 3]", "irradiance = [1, 2, 3]", "irradiance_at_1_m"},
+      {"= 20\nradiance = [4, 5, 6]", "= 20\nradiance = [4, -5, 6]", "scene.toml:43:"},
+      {"type = \"point\"", "type = \"point\"\nsharpness = 3", "sharpness"},
+  };
+  for (const Case& c : cases) {
+    const std::string said = message(with(text, c.from, c.to));
+    EXPECT_NE(said.find(c.expected), std::string::npos) << c.to << "\n" << said;
   }
 }
 

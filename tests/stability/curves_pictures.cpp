@@ -1,6 +1,8 @@
 // Curves of whole pictures: small fabrics through all stages, rendered, against path-traced
 // pictures of the same eye rays.
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -233,6 +235,50 @@ Curve behind_curve(Effort effort) {
       if (scale == 0) scale = truth;
       curve.series[both ? 1 : 0].values.push_back(std::abs(fast - truth) / scale);
     }
+  }
+  return curve;
+}
+
+Curve near_light_curve(Effort effort) {
+  Curve curve{.title = "Lights close to the cloth",
+              .driver = "distance of the light, tiles",
+              .measure = "relative RMSE of pixels",
+              .is_log = true,
+              .drivers = effort == Effort::kFull ? std::vector<double>{1, 2, 4, 8, 16, 64, 256}
+                                                 : std::vector<double>{1, 16, 256},
+              .series = {{"point", {}}, {"sphere", {}}, {"rectangle", {}}, {"Gaussian", {}}},
+              .warning_from = kNearTiles,
+              .warns_above = false};
+  const SmallFabric fabric;
+  SmallPipeline pipeline(fabric);
+  const int spp = effort == Effort::kFull ? 512 : 128;
+  const Vec3d axis = Vec3d(0.3, 0.2, 1).normalized();
+  const auto measure = [&](const std::string& light, const std::string& brightness) {
+    SmallScene scene;
+    scene.light = light;
+    scene.brightness = brightness;
+    return relative_error(pipeline.picture(scene, RenderMethod::kExact, spp).image,
+                          pipeline.picture(scene, RenderMethod::kPath, spp).image);
+  };
+  // Sphere and rectangle keep their angular size: half angles of 15 degrees about.
+  const double of_gaussian = measure(gaussian(axis, 60), "irradiance = [3, 3, 3]\n");
+  for (const double tiles : curve.drivers) {
+    const double d = 2 * fabric.spacing_mm * tiles;
+    const Vec3d p = d * axis;
+    const std::string place = fmt::format("position_mm = [{}, {}, {}]\n", p.x(), p.y(), p.z());
+    const double at_1_m = 3 * d * d * 1e-6;
+    curve.series[0].values.push_back(
+        measure("type = \"point\"\n" + place,
+                fmt::format("irradiance_at_1_m = [{0}, {0}, {0}]\n", at_1_m)));
+    curve.series[1].values.push_back(
+        measure(fmt::format("type = \"sphere\"\n{}radius_mm = {}\n", place, 0.26 * d),
+                "radiance = [10, 10, 10]\n"));
+    curve.series[2].values.push_back(measure(
+        fmt::format("type = \"rectangle\"\n{}look_at_mm = [0, 0, 0]\nup = [0, 1, 0]\nsize_mm = "
+                    "[{}, {}]\n",
+                    place, 0.5 * d, 0.4 * d),
+        "radiance = [10, 10, 10]\n"));
+    curve.series[3].values.push_back(of_gaussian);
   }
   return curve;
 }

@@ -153,6 +153,21 @@ TEST(BehindStability, ThinCloth) {
   EXPECT_GT(curve.of("data for light from the face").back(), 1) << "light from behind is missing";
 }
 
+TEST(NearLightStability, DistanceFromTheCloth) {
+  const Curve curve = measured(near_light_curve);
+  for (const char* name : {"point", "sphere", "rectangle"}) {
+    const auto& error = curve.of(name);
+    for (std::size_t k = 0; k < curve.drivers.size(); ++k) {
+      // Hard light, a point's, is worse than a Gaussian's (zoom_curve); outlines are harder too.
+      const double limit = curve.of("Gaussian")[k] * (std::string(name) == "point" ? 1.7 : 1.4);
+      if (!warned(curve, curve.drivers[k])) {
+        EXPECT_LT(error[k], limit) << name;
+      }
+      EXPECT_LT(error[k], 0.6) << name;
+    }
+  }
+}
+
 TEST(GrazingViewStability, FlatCloth) {
   const Curve curve = measured(grazing_curve);
   EXPECT_LT(largest(curve.of("mean")), 0.2);

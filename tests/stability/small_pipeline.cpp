@@ -47,10 +47,9 @@ std::string SmallScene::toml() const {
   return fmt::format(
       "name = \"small\"\n[camera]\nposition_mm = {}\nlook_at_mm = {}\nup = [0, 1, 0.001]\nfov_deg "
       "= {}\n"
-      "fov_axis = \"horizontal\"\nresolution_px = [{}, {}]\n[[light]]\n{}irradiance = [3, 3, "
-      "3]\n[[cloth]]\n{}"
+      "fov_axis = \"horizontal\"\nresolution_px = [{}, {}]\n[[light]]\n{}{}[[cloth]]\n{}"
       "fabric = \"fabric.toml\"\n",
-      list(eye), list(look_at), fov, pixels, pixels, light, piece);
+      list(eye), list(look_at), fov, pixels, pixels, light, brightness, piece);
 }
 
 std::string directional(const Vec3d& direction) {

@@ -48,7 +48,8 @@ struct SmallScene {
   int pixels = 24;
   double flat_mm = 40;
   std::string light = "type = \"directional\"\ndirection = [0.3, 0.2, 1]\n";
-  std::string cloth;  // instead of the flat swatch: its mesh keys
+  std::string brightness = "irradiance = [3, 3, 3]\n";  // of the light
+  std::string cloth;                                    // instead of the flat swatch: its mesh keys
 
   std::string toml() const;
 };

@@ -23,6 +23,7 @@ std::span<const NamedCurve> all_curves() {
        {"tile-border", tile_border_curve},
        {"rim", rim_curve},
        {"behind", behind_curve},
+       {"near-light", near_light_curve},
        {"grazing", grazing_curve},
        {"grazing-light", lobe_width_curve},
        {"bessel", bessel_curve},

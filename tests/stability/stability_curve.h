@@ -58,6 +58,7 @@ Curve cells_curve(Effort effort);
 Curve tile_border_curve(Effort effort);
 Curve rim_curve(Effort effort);
 Curve behind_curve(Effort effort);
+Curve near_light_curve(Effort effort);
 Curve grazing_curve(Effort effort);
 Curve truncation_curve(Effort effort);
 Curve zoom_curve(Effort effort);

@@ -3,6 +3,7 @@
 
 #include "pipeline/warnings.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <stdlib.h>
 
@@ -197,6 +198,20 @@ TEST(PictureWarningsStability, ViewsAndLights) {
   scene.wide_mm = 1.3 * tile * 16;
   EXPECT_EQ(pictures.warned(scene), Subjects{"distance"});
   EXPECT_EQ(pictures.warned(scene, RenderMethod::kExact, 4096), Subjects{}) << "enough samples";
+}
+
+TEST(PictureWarningsStability, LightsCloseToTheCloth) {
+  Pictures pictures;
+  const double tile = 2 * plain().spacing_mm;
+  SmallScene scene;
+  scene.brightness = "radiance = [1, 1, 1]\n";
+  for (const double tiles : {kNearTiles - 1, kNearTiles + 1}) {
+    // The picture is two tiles wide, and the sphere's surface that far above its middle.
+    scene.light = fmt::format("type = \"sphere\"\nposition_mm = [0, 0, {}]\nradius_mm = 0.5\n",
+                              tiles * tile + 0.5);
+    EXPECT_EQ(pictures.warned(scene), tiles < kNearTiles ? Subjects{"near-light"} : Subjects{});
+    EXPECT_EQ(pictures.warned(scene, RenderMethod::kPath), Subjects{});
+  }
 }
 
 TEST(PictureWarningsStability, SharpnessOfLights) {

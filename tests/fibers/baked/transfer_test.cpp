@@ -54,6 +54,28 @@ Transfer random_transfer_with_cones() {
   return t;
 }
 
+TEST(TransferLaw, LightInColoursIsSummedColourByColour) {
+  const Transfer t = random_transfer_with_cones();
+  std::vector<float> light(27);
+  for (std::size_t k = 0; k < 27; ++k) light[k] = 0.3F * static_cast<float>(k % 7) - 0.5F;
+  std::vector<float> whole(27, 1.0F);
+  std::vector<float> less(27, 1.0F);
+  t.add_incoming(5, light.data(), whole.data());
+  t.subtract_incoming_of_cones(5, light.data(), less.data());
+  for (std::size_t c = 0; c < 3; ++c) {
+    std::vector<float> one(9);
+    for (std::size_t j = 0; j < 9; ++j) one[j] = light[3 * j + c];
+    std::vector<float> expected(27);
+    std::vector<float> without(27);
+    t.incoming(5, one.data(), expected.data());
+    t.incoming(5, one.data(), 1, without.data());
+    for (std::size_t j = 0; j < 9; ++j) {
+      EXPECT_NEAR(whole[3 * j + c], 1 + expected[3 * j + c], 1e-5);
+      EXPECT_NEAR(less[3 * j + c], 1 + without[3 * j + c] - expected[3 * j + c], 1e-5);
+    }
+  }
+}
+
 TEST(TransferLaw, ConesLeaveTheHarmonicsByTheirShare) {
   const Transfer t = random_transfer_with_cones();
   std::vector<float> light(9);
