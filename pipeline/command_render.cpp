@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -15,6 +16,7 @@
 #include "pipeline/picture_request.h"
 #include "pipeline/plan/scene_plan.h"
 #include "pipeline/scene_job.h"
+#include "render/noise_target.h"
 #include "render/render_output.h"
 
 namespace heddle {
@@ -23,6 +25,9 @@ namespace {
 void apply_overrides(const RenderOptions& options, PictureRequest& request) {
   if (!options.method.empty()) request.method = *render_method_of(options.method);
   if (options.spp) request.spp = *options.spp;
+  if (options.noise && options.seconds) throw ConfigError("--noise: not together with --seconds");
+  if (options.noise) request.spp = std::max(2, request.spp);
+  request.noise = options.noise;
   if (!options.crop.empty()) request.crop = parse_crop(options.crop, request.camera);
   const bool path = traces_paths(request.method);
   if (!path && (options.seconds || options.local || !options.estimator.empty())) {
@@ -56,11 +61,12 @@ Estimate relative_noise_of(const FrameBuffers& frame) {
 /// The cheapest picture that is good enough.
 int render_within(double tolerance, const RenderOptions& options, Job& job) {
   const bool by_hand = !options.method.empty() || options.spp || options.seconds || options.local ||
-                       options.bounces || options.order || !options.estimator.empty();
+                       options.bounces || options.order || options.noise ||
+                       !options.estimator.empty();
   if (by_hand) {
     throw ConfigError(
         "--tolerance chooses method, samples and data: not together with --method, --spp, "
-        "--seconds, --local, --bounces, --estimator or --order");
+        "--seconds, --noise, --local, --bounces, --estimator or --order");
   }
   const ScenePlan plan = make_plan(
       {.scene = options.scene,
@@ -82,7 +88,7 @@ int render_within(double tolerance, const RenderOptions& options, Job& job) {
   request.more = [&](const FrameBuffers& frame) {
     noise_square = relative_noise_of(frame);
     spp = frame.spp;
-    return more_samples(way.candidate, noise_square, frame.spp, tolerance);
+    return std::vector<int>{more_samples(way.candidate, noise_square, frame.spp, tolerance)};
   };
   const PictureResult picture = scene.render(request, "render");
   const double noise = std::sqrt(noise_square.value / spp);
@@ -123,6 +129,17 @@ int render_command(const RenderOptions& options, const CommonOptions& common) {
   PictureRequest request = scene.request(find_view(scene.config(), options.view));
   apply_overrides(options, request);
   const PictureResult picture = scene.render(request, "render");
+  if (options.noise) {
+    const std::string done =
+        fmt::format("{:.4g} samples per pixel on the mean, noise of the noisiest block {:.3g} %",
+                    picture.mean_samples, 100 * picture.largest_noise);
+    if (picture.largest_noise > *options.noise) {
+      job.console().warn(done +
+                         fmt::format(": {} samples do not make it quieter", kMostSamplesForNoise));
+    } else {
+      job.console().say(done);
+    }
+  }
   write_picture(options.output, picture, picture_report(picture));
   job.add_artifact(options.output);
   job.finish();

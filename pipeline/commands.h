@@ -82,6 +82,7 @@ struct RenderOptions {
   std::optional<int> bounces;
   std::string estimator;  // "mis" where empty
   std::optional<int> order;
+  std::optional<double> noise;      // at which each block of pixels ends
   std::optional<double> tolerance;  // method, samples and data by a plan
   int pictures = 1;                 // that the plan reckons with
 };

@@ -276,6 +276,11 @@ void add_render(CLI::App& app, Options& options, Actions& actions) {
       ->check(CLI::Range(1, 1 << 24));
   render->add_option("--seconds", picture.seconds, "Path tracer: render for this many seconds")
       ->check(CLI::PositiveNumber);
+  render
+      ->add_option("--noise", picture.noise,
+                   "Samples are added until the noise of every 16 x 16 pixels, relative to their "
+                   "mean, is so low: 0.05 is 5 %")
+      ->check(CLI::Range(1e-4, 10.0));
   add_crop(*render, picture.crop);
   render->add_flag("--local", picture.local, "Path tracer: paths that leave the cloth's shell end");
   render

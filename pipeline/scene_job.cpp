@@ -15,6 +15,7 @@
 #include "pipeline/interrupt.h"
 #include "pipeline/version.h"
 #include "render/cloth_scene.h"
+#include "render/noise_target.h"
 #include "render/precomputed_renderer.h"
 #include "render/render_output.h"
 #include "render/tone_map.h"
@@ -26,7 +27,7 @@ namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
 // Version of what all render methods compute; part of every picture's key.
-constexpr int kPictureVersion = 2;
+constexpr int kPictureVersion = 3;
 
 std::string camera_text(const CameraConfig& camera) {
   const auto list = [](const Vec3d& v) { return fmt::format("{},{},{}", v.x(), v.y(), v.z()); };
@@ -241,6 +242,7 @@ std::string SceneJob::picture_key(const PictureRequest& request) {
   values.emplace_back("method", render_method_name(request.method));
   values.emplace_back("crop", crop_text(request.crop));
   values.emplace_back("sampling", fmt::format("spp {} seed {}", request.spp, request.seed));
+  if (request.noise) values.emplace_back("noise", fmt::format("{}", *request.noise));
   values.emplace_back("paths",
                       fmt::format("local {} bounces {} estimator {}", request.local,
                                   request.bounces.value_or(0), estimator_name(request.estimator)));
@@ -321,11 +323,12 @@ struct SceneJob::Shading {
 
   FrameBuffers frame(const PictureRequest& request, const Camera& camera, const PixelRect& crop,
                      const RenderProgress& progress) const {
+    const MoreSamples more = request.noise ? until_noise(*request.noise) : request.more;
     if (tracer) {
       return trace_picture(*tracer, camera, crop, request.seed,
-                           {request.spp, request.seconds, request.more}, progress);
+                           {request.spp, request.seconds, more}, progress);
     }
-    return shade_picture(*renderer, camera, crop, request.spp, progress, request.more);
+    return shade_picture(*renderer, camera, crop, request.spp, progress, more);
   }
 };
 
@@ -376,8 +379,8 @@ PictureResult SceneJob::render(const PictureRequest& request, const std::string&
                                bool quiet) {
   // More samples than one are possible where a picture goes on until it is good enough.
   const std::uint64_t bytes =
-      picture_bytes(request.crop.width, request.crop.height, request.more ? 2 : request.spp,
-                    !traces_paths(request.method));
+      picture_bytes(request.crop.width, request.crop.height,
+                    request.more || request.noise ? 2 : request.spp, !traces_paths(request.method));
   announce_memory(*context_->console,
                   fmt::format("{}: {} x {} pixels", title, request.crop.width, request.crop.height),
                   bytes);
@@ -445,6 +448,14 @@ PictureResult SceneJob::render(const PictureRequest& request, const std::string&
   };
   result.image = image_of(frame, metadata);
   result.time = time;
+  for (std::size_t k = 0; k < frame.pixel_count(); ++k) {
+    result.mean_samples +=
+        static_cast<double>(frame.samples_of(k)) / static_cast<double>(frame.pixel_count());
+  }
+  if (!frame.half0.empty()) {
+    const std::vector<double> noise = noise_of_blocks(frame);
+    result.largest_noise = *std::max_element(noise.begin(), noise.end());
+  }
   if (shading->renderer) result.fitted_lights = shading->renderer->fitted_lights();
   result.failed_shell_walks = loaded.scene->failed_walks();
   result.flipped_tetrahedra = loaded.scene->flipped_tets();
@@ -458,6 +469,8 @@ Json picture_report(const PictureResult& picture) {
   for (const auto& [name, value] : picture.image.metadata) report[name] = value;
   report["seconds"] = picture.time.seconds;
   report["core_seconds"] = picture.time.core_seconds;
+  report["mean_samples"] = picture.mean_samples;
+  report["largest_noise_of_a_block"] = picture.largest_noise;
   const FittedLights& fitted = picture.fitted_lights;
   if (fitted.relative_error > 0) {
     report["environment_fit_relative_error"] = fitted.relative_error;

@@ -70,12 +70,16 @@ struct PictureRequest {
   std::optional<int> bounces;
   LightEstimator estimator = LightEstimator::kCombined;
   MoreSamples more = {};  // beyond spp; needs 2 or more of those
+  // Goes on beyond spp, block by block, until the noise is so low (until_noise); not with `more`.
+  std::optional<double> noise = {};
 };
 
 /// A picture and what is worth knowing of its making.
 struct PictureResult {
   Image image;  // its metadata name scene, method, key, seed, samples and crop
   WorkTime time;
+  double mean_samples = 0;     // of a pixel
+  double largest_noise = 0;    // of a block (noise_of_blocks); 0 with one sample
   FittedLights fitted_lights;  // and the errors of what stands for environments
   std::uint64_t failed_shell_walks = 0;
   std::uint32_t flipped_tetrahedra = 0;

@@ -8,8 +8,9 @@ RandomStream GBuffer::random(std::uint64_t seed, RandomStage stage, std::uint32_
   const int pixel = static_cast<int>(sample) / per_pixel();
   const auto x = static_cast<std::uint64_t>(block.x0 + pixel % block.width);
   const auto y = static_cast<std::uint64_t>(block.y0 + pixel / block.width);
-  return {seed, stage, y * frame_width + x,
-          static_cast<std::uint64_t>(first + static_cast<int>(sample) % per_pixel())};
+  return RandomStream::stratified(
+      seed, stage, y * frame_width + x,
+      static_cast<std::uint64_t>(first + static_cast<int>(sample) % per_pixel()));
 }
 
 GBufferPass::GBufferPass(const ClothScene& scene, std::vector<const FabricPack*> packs,

@@ -52,8 +52,8 @@ struct GBuffer {
   std::uint32_t sample_count() const {
     return static_cast<std::uint32_t>(block.width * block.height * per_pixel());
   }
-  /// Random numbers of one sample. They are addressed by the pixel of the whole picture, so they
-  /// depend neither on the crop nor on the block.
+  /// Random numbers of one sample, stratified over the samples of its pixel. They are addressed by
+  /// the pixel of the whole picture, so they depend neither on the crop nor on the block.
   RandomStream random(std::uint64_t seed, RandomStage stage, std::uint32_t sample) const;
 };
 

@@ -19,6 +19,10 @@ bool rises_above(const Light& light, const Vec3d& point, const Vec3d& normal) {
   return normal.dot(light.position_mm - point) + reach > 0;
 }
 
+/// Draws kept for each light, so that those of one light are the same ones in every sample: of its
+/// direction, of the place along the cloth, and of the direction that a method takes it from.
+constexpr std::uint64_t kDrawsPerLight = 6;
+
 Vec2 sample_gaussian2(RandomStream& random) {
   const float radius = std::sqrt(-2 * std::log(1 - random.uniform()));
   const float angle = 2 * kPif * random.uniform();
@@ -43,9 +47,13 @@ LightVisibility LightVisibilityPass::run(const GBuffer& g_buffer) const {
   result.visible.reserve(count);
   if (draw_directions_) result.direction.reserve(count);
   for (const SeenFiber& fiber : g_buffer.fibers) {
-    RandomStream random = g_buffer.random(seed_, RandomStage::kLightVisibility, fiber.sample);
-    for (const Light& light : lights_) {
-      const LightVisibility::OfLight visible = find(fiber.hit, light, random);
+    const RandomStream draws = g_buffer.random(seed_, RandomStage::kLightVisibility, fiber.sample);
+    RandomStream redraw = g_buffer.random(seed_, RandomStage::kLightRedraw, fiber.sample);
+    for (std::size_t l = 0; l < lights_.size(); ++l) {
+      const Light& light = lights_[l];
+      RandomStream random = draws;
+      random.skip(kDrawsPerLight * l);
+      const LightVisibility::OfLight visible = find(fiber.hit, light, random, redraw);
       result.visible.push_back(visible);
       if (!draw_directions_) continue;
       result.direction.push_back(visible.at_point
@@ -57,7 +65,8 @@ LightVisibility LightVisibilityPass::run(const GBuffer& g_buffer) const {
 }
 
 LightVisibility::OfLight LightVisibilityPass::find(const ShellHit& hit, const Light& light,
-                                                   RandomStream& random) const {
+                                                   RandomStream& random,
+                                                   RandomStream& redraw) const {
   const Part& part = parts_[hit.part];
   if (light.is_near() && !part.light_from_both_sides) {
     const Vec3d up = scene_->shell(hit.cloth).fabric_from_world(hit.tet).row(2).cast<double>();
@@ -68,7 +77,7 @@ LightVisibility::OfLight LightVisibilityPass::find(const ShellHit& hit, const Li
   float height = 0;
   for (int draw = 0; draw < kFaceDraws; ++draw) {
     if (!light.is_directional()) {
-      const LightSample sample = sample_light(light, hit.position, random);
+      const LightSample sample = sample_light(light, hit.position, draw == 0 ? random : redraw);
       if (light.is_near() && (sample.weight == 0).all()) return {};  // on its dark side
       direction = sample.direction;
       distance = sample.distance;

@@ -57,8 +57,9 @@ class LightVisibilityPass {
   LightVisibility run(const GBuffer& g_buffer) const;
 
  private:
-  LightVisibility::OfLight find(const ShellHit& hit, const Light& light,
-                                RandomStream& random) const;
+  /// `redraw`: of directions that lie behind the cloth.
+  LightVisibility::OfLight find(const ShellHit& hit, const Light& light, RandomStream& random,
+                                RandomStream& redraw) const;
 
   const ClothScene* scene_;
   std::vector<Part> parts_;

@@ -57,14 +57,26 @@ std::vector<BcsdfTable> scene_materials(const ClothScene& scene) {
   return tables;
 }
 
+namespace {
+
+int most_missing(const std::vector<int>& done, const std::vector<int>& wanted) {
+  int most = 0;
+  for (std::size_t k = 0; k < done.size(); ++k) most = std::max(most, wanted[k] - done[k]);
+  return most;
+}
+
+}  // namespace
+
 FrameBuffers trace_picture(const PathTracer& tracer, const Camera& camera, const PixelRect& crop,
                            std::uint64_t seed, const SampleBudget& budget,
                            const RenderProgress& progress) {
   assert(budget.seconds || (budget.spp >= 2 && budget.spp % 2 == 0));
   const int pixel_count = crop.width * crop.height;
   std::vector<PixelSums> sums(static_cast<std::size_t>(pixel_count));
+  std::vector<int> done(sums.size(), 0);
+  std::vector<int> wanted(sums.size(), budget.spp);
 
-  const auto pass = [&](int first_sample, int last_sample) {
+  const auto pass = [&](int count) {
     // 16 pixels: long enough to pay for a task, short enough to share out a few expensive ones.
     tbb::parallel_for(
         tbb::blocked_range<int>(0, pixel_count, 16), [&](const tbb::blocked_range<int>& range) {
@@ -74,9 +86,13 @@ FrameBuffers trace_picture(const PathTracer& tracer, const Camera& camera, const
             const auto pixel =
                 static_cast<std::uint64_t>(y) * static_cast<std::uint64_t>(camera.width()) +
                 static_cast<std::uint64_t>(x);
-            PixelSums& sum = sums[static_cast<std::size_t>(k)];
-            for (int s = first_sample; s < last_sample; ++s) {
-              RandomStream eye(seed, RandomStage::kEyeRay, pixel, static_cast<std::uint64_t>(s));
+            const auto place = static_cast<std::size_t>(k);
+            PixelSums& sum = sums[place];
+            const int first = done[place];
+            done[place] = budget.seconds ? first + count : std::min(wanted[place], first + count);
+            for (int s = first; s < done[place]; ++s) {
+              RandomStream eye = RandomStream::stratified(seed, RandomStage::kEyeRay, pixel,
+                                                          static_cast<std::uint64_t>(s));
               RandomStream random(seed, RandomStage::kPathTracer, pixel,
                                   static_cast<std::uint64_t>(s));
               const double px = x + eye.uniform_double();
@@ -92,21 +108,19 @@ FrameBuffers trace_picture(const PathTracer& tracer, const Camera& camera, const
   frame.half1.resize(sums.size());
   frame.variance.resize(sums.size());
   const auto start = std::chrono::steady_clock::now();
-  for (int wanted = budget.spp, more = 1; more > 0; wanted += more) {
+  do {
+    const int most = most_missing(done, wanted);
     for (double share = 0; share < 1;) {
       progress(share);
-      const int count = budget.seconds ? 2 : std::min(8, wanted - frame.spp);
-      pass(frame.spp, frame.spp + count);
-      frame.spp += count;
+      pass(budget.seconds ? 2 : 8);
       const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
       share = budget.seconds ? spent.count() / *budget.seconds
-                             : static_cast<double>(frame.spp) / wanted;
+                             : 1 - static_cast<double>(most_missing(done, wanted)) / most;
     }
     progress(1.0);
-    for (std::size_t k = 0; k < sums.size(); ++k) sums[k].store(frame.spp, k, frame);
-    more = budget.more ? budget.more(frame) : 0;
-    assert(more % 2 == 0);
-  }
+    for (std::size_t k = 0; k < sums.size(); ++k) sums[k].store(done[k], k, frame);
+    set_samples(done, frame);
+  } while (budget.more && add_samples(budget.more(frame), frame, wanted));
   return frame;
 }
 

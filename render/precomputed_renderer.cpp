@@ -18,9 +18,8 @@
 namespace heddle {
 namespace {
 
-/// A block is this many pixels wide and high, and takes this many samples at a time. 2048 samples
-/// fill a G-buffer of 400 KB, and give a close-up enough samples per cell to sort.
-constexpr int kBlockEdge = 16;
+/// A block of kBlockEdge x kBlockEdge pixels takes this many samples at a time. 2048 samples fill a
+/// G-buffer of 400 KB, and give a close-up enough samples per cell to sort.
 constexpr int kBlockSamples = 8;
 
 /// Blocks between two calls of the progress callback.
@@ -271,9 +270,11 @@ class BlockPicture {
         sums_(static_cast<std::size_t>(block_count()) * kBlockPixels) {}
 
   int block_count() const { return columns_ * rows_; }
+  std::size_t first_pixel(int index) const { return place_in_frame(block_at(index), 0); }
 
   /// Samples first_sample .. last_sample - 1 of a block's pixels; those before are there.
   void shade_block(int index, int first_sample, int last_sample) {
+    if (first_sample == last_sample) return;
     const PixelRect block = block_at(index);
     PixelSums* const sums = &sums_[static_cast<std::size_t>(index) * kBlockPixels];
     for (int first = first_sample; first < last_sample; first += kBlockSamples) {
@@ -347,15 +348,20 @@ FrameBuffers shade_picture(const PrecomputedRenderer& renderer, const Camera& ca
   FrameBuffers frame = empty_frame(crop.width, crop.height, spp);
   BlockPicture picture(renderer, camera, crop, frame);
   const int blocks = picture.block_count();
-  for (int wanted = spp; wanted > frame.spp; wanted += more ? more(frame) : 0) {
+  std::vector<int> done(frame.pixel_count(), 0);
+  std::vector<int> wanted(frame.pixel_count(), spp);
+  do {
     for (int start = 0; start < blocks; start += kBlocksPerReport) {
       progress(static_cast<double>(start) / blocks);
-      tbb::parallel_for(start, std::min(blocks, start + kBlocksPerReport),
-                        [&](int index) { picture.shade_block(index, frame.spp, wanted); });
+      tbb::parallel_for(start, std::min(blocks, start + kBlocksPerReport), [&](int index) {
+        const std::size_t first = picture.first_pixel(index);
+        picture.shade_block(index, done[first], wanted[first]);
+      });
     }
     progress(1.0);
-    frame.spp = wanted;
-  }
+    done = wanted;
+    set_samples(done, frame);
+  } while (more && add_samples(more(frame), frame, wanted));
   return frame;
 }
 

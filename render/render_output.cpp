@@ -48,6 +48,31 @@ std::uint64_t picture_bytes(int width_px, int height_px, int spp, bool with_fibe
   return pixel * static_cast<std::uint64_t>(width_px) * static_cast<std::uint64_t>(height_px);
 }
 
+std::size_t block_of_pixel(int x, int y, int width_px) {
+  const int columns = (width_px + kBlockEdge - 1) / kBlockEdge;
+  return static_cast<std::size_t>(y / kBlockEdge * columns + x / kBlockEdge);
+}
+
+bool add_samples(const std::vector<int>& more, const FrameBuffers& frame,
+                 std::vector<int>& wanted) {
+  bool any = false;
+  for (std::size_t k = 0; k < wanted.size(); ++k) {
+    const auto x = static_cast<int>(k % static_cast<std::size_t>(frame.width));
+    const auto y = static_cast<int>(k / static_cast<std::size_t>(frame.width));
+    const int added = more.size() == 1 ? more[0] : more[block_of_pixel(x, y, frame.width)];
+    wanted[k] += added;
+    any = any || added > 0;
+  }
+  return any;
+}
+
+void set_samples(const std::vector<int>& done, FrameBuffers& frame) {
+  const auto [fewest, most] = std::minmax_element(done.begin(), done.end());
+  frame.spp = *most;
+  frame.samples.clear();
+  if (*fewest != *most) frame.samples = done;
+}
+
 Image image_of(const FrameBuffers& frame, const std::map<std::string, std::string>& metadata) {
   Image image;
   image.width = frame.width;
@@ -60,6 +85,10 @@ Image image_of(const FrameBuffers& frame, const std::map<std::string, std::strin
   add_color(image, "half0", frame.half0, ChannelType::kHalf);
   add_color(image, "half1", frame.half1, ChannelType::kHalf);
   add_color(image, "Variance", frame.variance, ChannelType::kFloat);
+  if (!frame.samples.empty()) {
+    image.channels["samples"] = {
+        ChannelType::kUint, {}, {frame.samples.begin(), frame.samples.end()}};
+  }
   add_triples(image, frame.fabric_position, ChannelType::kFloat, {"u", "v", "w"});
   add_triples(image, frame.tangent, ChannelType::kFloat, {"tangent.X", "tangent.Y", "tangent.Z"});
   if (!frame.depth.empty()) image.channels["Z"] = {ChannelType::kFloat, frame.depth, {}};

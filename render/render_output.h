@@ -3,6 +3,7 @@
 // The buffers of a picture and their form as image layers, row-major, row 0 at the top:
 //   all methods            beauty R, G, B, A; single.*, multiple.*
 //   with halves            half0.*, half1.*, Variance.*
+//   rendered to a noise    samples
 //   precomputed methods    segment, cell (ids, 0xffffffff = none, as on surface cloths)
 //                          u, v, w (fabric position of the hit, mm), tangent.X/Y/Z (world)
 //                          Z (distance along the view direction, mm; 0 = nothing hit)
@@ -43,6 +44,9 @@ struct FrameBuffers {
   std::vector<Rgb> half1;     // [pixel] beauty of the odd samples
   std::vector<Rgb> variance;  // [pixel] of the mean in `beauty`, estimated
 
+  // [pixel] samples, where pixels have different numbers of them; spp is then the largest.
+  std::vector<int> samples;
+
   // Precomputed methods only, else empty: the eye ray through the first sample of each pixel.
   std::vector<std::uint32_t> segment;  // [pixel]
   std::vector<std::uint32_t> cell;     // [pixel]
@@ -50,15 +54,28 @@ struct FrameBuffers {
   std::vector<float> depth;            // [pixel] mm
   std::vector<Vec3> tangent;           // [pixel]
 
+  int samples_of(std::size_t pixel) const { return samples.empty() ? spp : samples[pixel]; }
   std::size_t pixel_count() const {
     return static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   }
 };
 
 /// Asked with the picture so far, once the requested samples are done. Returns how many more per
-/// pixel (an even number if paths are traced); 0 ends the picture. The result is the same as if all
-/// its samples had been asked for at once.
-using MoreSamples = std::function<int(const FrameBuffers&)>;
+/// pixel (even numbers if paths are traced): one number for all, or one for each block of
+/// kBlockEdge x kBlockEdge pixels, row by row. Nothing but 0 ends the picture. A pixel's result is
+/// the same as if all its samples had been asked for at once.
+using MoreSamples = std::function<std::vector<int>(const FrameBuffers&)>;
+inline constexpr int kBlockEdge = 16;
+
+/// Place of a pixel's block among those of a picture.
+std::size_t block_of_pixel(int x, int y, int width_px);
+
+/// Adds what MoreSamples returned to the samples wanted of each pixel. Returns whether anything is
+/// wanted.
+bool add_samples(const std::vector<int>& more, const FrameBuffers& frame, std::vector<int>& wanted);
+
+/// After the samples of each pixel are done.
+void set_samples(const std::vector<int>& done, FrameBuffers& frame);
 
 /// Bytes of memory that a picture takes at its peak. That is the frame, with either the sums of its
 /// pixels or the image that is written, whichever is more.

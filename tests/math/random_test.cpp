@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <set>
+#include <utility>
 #include <vector>
 
 #include "tests/support/statistics.h"
@@ -64,6 +65,56 @@ TEST(RandomStatistical, PairsOfDrawsAreUniform) {
     const ChiSquareResult result = chi_square(expected, observed);
     std::printf("  pairs along axis %d: chi-square %.1f, %d degrees, p = %.3g\n", axis,
                 result.statistic, result.degrees, result.p_value);
+    EXPECT_GT(result.p_value, sidak_significance(3));
+  }
+}
+
+// Of 2^k points, each of the 2^k boxes of 2^-i x 2^-(k - i) holds one, in every pair of draws, for
+// even and for odd samples.
+TEST(RandomLaw, StratifiedDrawsFillEveryBoxOnce) {
+  for (const std::uint64_t parity : {0U, 1U}) {
+    for (int pair = 0; pair < 3; ++pair) {
+      for (int k = 0; k <= 8; ++k) {
+        for (int i = 0; i <= k; ++i) {
+          std::set<std::pair<int, int>> boxes;
+          for (std::uint64_t n = 0; n < (1U << k); ++n) {
+            RandomStream random =
+                RandomStream::stratified(5, RandomStage::kTest, 17, 2 * n + parity);
+            for (int skipped = 0; skipped < 2 * pair; ++skipped) random.bits();
+            const double u = random.uniform_double();
+            const double v = random.uniform_double();
+            boxes.emplace(static_cast<int>(u * (1 << i)), static_cast<int>(v * (1 << (k - i))));
+          }
+          ASSERT_EQ(boxes.size(), 1U << k) << "pair " << pair << ", " << i << " of " << k;
+        }
+      }
+    }
+  }
+}
+
+// Over many items, a sample's draws are uniform, and those of two samples (one even, one odd), of
+// two pairs and of two items do not know of each other.
+TEST(RandomStatistical, StratifiedDrawsOfDifferentSetsAreIndependent) {
+  constexpr int kCount = 200000;
+  constexpr int kSide = 16;
+  for (int kind = 0; kind < 3; ++kind) {
+    std::vector<double> observed(kSide * kSide, 0.0);
+    for (std::uint64_t item = 0; item < kCount; ++item) {
+      RandomStream a = RandomStream::stratified(3, RandomStage::kTest, item, 6);
+      RandomStream b = RandomStream::stratified(3, RandomStage::kTest, item + (kind == 2 ? 1 : 0),
+                                                kind == 0 ? 7 : 6);
+      if (kind == 1) {
+        b.bits();
+        b.bits();
+      }
+      const auto u = static_cast<std::size_t>(a.uniform() * kSide);
+      const auto v = static_cast<std::size_t>(b.uniform() * kSide);
+      observed[u * kSide + v] += 1;
+    }
+    const ChiSquareResult result = chi_square(
+        std::vector<double>(kSide * kSide, static_cast<double>(kCount) / (kSide * kSide)),
+        observed);
+    std::printf("  stratified, kind %d: p = %.3g\n", kind, result.p_value);
     EXPECT_GT(result.p_value, sidak_significance(3));
   }
 }

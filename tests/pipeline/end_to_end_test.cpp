@@ -910,7 +910,7 @@ TEST(RenderEndToEnd, MoreSamplesMakeThePictureOfAll) {
     request.spp = 10;
     const PictureResult whole = job.render(request, "whole");
     request.spp = 4;
-    request.more = [](const FrameBuffers& frame) { return frame.spp < 10 ? 2 : 0; };
+    request.more = [](const FrameBuffers& frame) { return std::vector{frame.spp < 10 ? 2 : 0}; };
     const PictureResult grown = job.render(request, "grown");
     EXPECT_EQ(grown.image.metadata, whole.image.metadata) << "its key among them";
     write_exr(shop / "whole.exr", whole.image);

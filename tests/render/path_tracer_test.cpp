@@ -428,7 +428,7 @@ TEST(PathTracerEndToEnd, MoreSamplesMakeThePictureOfAll) {
   const FrameBuffers grown = small_picture(all, 6, [&](const FrameBuffers& frame) {
     EXPECT_TRUE(same(frame.variance, small_picture(all, frame.spp).variance));
     seen.push_back(frame.spp);
-    return seen.size() == 1 ? 10 : seen.size() == 2 ? 4 : 0;
+    return std::vector{seen.size() == 1 ? 10 : seen.size() == 2 ? 4 : 0};
   });
   EXPECT_EQ(seen, (std::vector<int>{6, 16, 20}));
   const FrameBuffers whole = small_picture(all, 20);
@@ -436,6 +436,22 @@ TEST(PathTracerEndToEnd, MoreSamplesMakeThePictureOfAll) {
   EXPECT_TRUE(same(grown.beauty, whole.beauty));
   EXPECT_TRUE(same(grown.half1, whole.half1));
   EXPECT_TRUE(same(grown.variance, whole.variance));
+}
+
+// Blocks of 16 x 16 pixels go on alone: here the right one of two, cut to 8 x 16.
+TEST(PathTracerEndToEnd, BlocksMayHaveDifferentNumbersOfSamples) {
+  const PixelRect all = {0, 0, 24, 16};
+  const FrameBuffers grown = small_picture(all, 6, [&](const FrameBuffers& frame) {
+    return std::vector{0, frame.spp == 6 ? 4 : 0};
+  });
+  const FrameBuffers six = small_picture(all, 6);
+  const FrameBuffers ten = small_picture(all, 10);
+  for (std::size_t k = 0; k < grown.pixel_count(); ++k) {
+    const FrameBuffers& expected = k % 24 < 16 ? six : ten;
+    EXPECT_EQ(grown.samples_of(k), expected.spp);
+    EXPECT_TRUE((grown.beauty[k] == expected.beauty[k]).all() &&
+                (grown.half1[k] == expected.half1[k]).all());
+  }
 }
 
 // What a pixel stores of four samples, by hand: means of all and of every other one, and the

@@ -210,7 +210,8 @@ TEST(PrecomputedRenderer, SingleScatteringIsTheBcsdfAtTheFiberSeen) {
       if (frame.segment[k] == 0xffffffffU) continue;
       const Vec3 tangent = world->pack.exemplar.segment_tangent(frame.segment[k]);
       EXPECT_LT((frame.tangent[k] - tangent).norm(), 1e-5);
-      RandomStream eye(1, RandomStage::kEyeRay, static_cast<std::uint64_t>(k), 0);
+      RandomStream eye =
+          RandomStream::stratified(1, RandomStage::kEyeRay, static_cast<std::uint64_t>(k), 0);
       const double px = x + eye.uniform_double();
       const double py = y + eye.uniform_double();
       const Vec3 wo = -camera.ray(px, py).direction;
@@ -415,7 +416,7 @@ TEST(PrecomputedRendererEndToEnd, MoreSamplesMakeThePictureOfAll) {
   const FrameBuffers grown = shade_picture(world->renderer(), camera, {0, 0, 20, 20}, 3,
                                            test::no_progress, [&](const FrameBuffers& frame) {
                                              seen.push_back(frame.spp);
-                                             return 13 - frame.spp;
+                                             return std::vector{13 - frame.spp};
                                            });
   EXPECT_EQ(seen, (std::vector<int>{3, 13}));
   EXPECT_EQ(grown.spp, 13);
