@@ -46,7 +46,8 @@ nlohmann::json mesh_text(const MeshFile& mesh) {
   if (mesh.is_smooth()) {
     text.push_back({{"subdivide", mesh.subdivide},
                     {"px", mesh.subdivide_px.value_or(0)},
-                    {"sharp_corners", mesh.sharp_corners}});
+                    {"sharp_corners", mesh.sharp_corners},
+                    {"near_vertices", mesh.near_vertices}});
   }
   if (!mesh.placement.is_identity()) text.push_back(placement_text(mesh.placement));
   return text;

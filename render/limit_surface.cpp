@@ -128,6 +128,25 @@ class Cutter {
   }
 
   ClothMesh cut(const std::string& name) {
+    evaluate_faces(name);
+    finish();
+    return std::move(result_);
+  }
+
+  /// Adds to vertices and values of `mesh` by how much the surface misses those of `target`.
+  void add_misses(const ControlMesh& target, ControlMesh& mesh, const std::string& name) {
+    evaluate_faces(name);
+    for (std::size_t value = 0; value < mesh.fabric.size(); ++value) {
+      if (points_[mesh.value_owner[value]].is_placed)
+        mesh.fabric[value] += target.fabric[value] - result_.fabric[value];
+    }
+    for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
+      if (points_[v].is_placed) mesh.positions[v] += target.positions[v] - points_[v].position;
+    }
+  }
+
+ private:
+  void evaluate_faces(const std::string& name) {
     const std::unique_ptr<Far::TopologyRefiner> refiner = refiner_of(mesh_, name);
     const Bfr::RefinerSurfaceFactory<> factory(*refiner);
     points_.assign(mesh_.positions.size(), {});
@@ -139,11 +158,8 @@ class Cutter {
       evaluate(cuts);
       add_face(cuts);
     });
-    finish();
-    return std::move(result_);
   }
 
- private:
   struct Point {
     Vec3d position = Vec3d::Zero();
     Vec3d normal = Vec3d::Zero();  // sum over faces
@@ -182,7 +198,9 @@ class Cutter {
       surface_.Evaluate(&uv_[2 * k], patch_.data(), 3, here_[k].position.data(), du.data(),
                         dv.data());
       const Vec3d normal = du.cross(dv);
-      here_[k].normal = normal.norm() > 0 ? Vec3d(normal.normalized()) : Vec3d(0, 0, 0);
+      // At a corner that is rounded off both derivatives run along the rim.
+      const bool is_flat_corner = normal.norm() <= 1e-7 * du.norm() * dv.norm();
+      here_[k].normal = is_flat_corner ? Vec3d(0, 0, 0) : Vec3d(normal.normalized());
       fabric_.Evaluate(&uv_[2 * k], fabric_patch_.data(), 2, fabric_here_[k].data());
     }
   }
@@ -286,6 +304,17 @@ class Cutter {
 };
 
 }  // namespace
+
+ControlMesh drawn_to_vertices(ControlMesh mesh, int rounds, const std::string& name) {
+  const std::vector<std::uint8_t> is_shown = std::exchange(mesh.is_shown, {});
+  const ControlMesh target = mesh;
+  for (int round = 0; round < rounds; ++round) {
+    const ControlMesh now = mesh;
+    Cutter(now, [](const Vec3d&, const Vec3d&) { return 1; }).add_misses(target, mesh, name);
+  }
+  mesh.is_shown = is_shown;
+  return mesh;
+}
 
 std::size_t limit_triangles(const ControlMesh& mesh, const EdgePieces& pieces) {
   std::size_t count = 0;

@@ -19,6 +19,8 @@ namespace {
 
 constexpr int kMostPieces = 1024;  // of an edge
 constexpr std::size_t kMostTriangles = 16'000'000;
+// Towards the vertices. Two leave least stretch in the cloth of simulated drapes (docs/meshes.md).
+constexpr int kRounds = 2;
 // Of a shell or a mesh and what traces rays through it, per triangle, while it is built.
 constexpr std::uint64_t kBytesPerTriangle = 1200;
 // How much longer pieces may be that no camera sees: they throw shadows only.
@@ -61,6 +63,8 @@ ClothMesh smooth_mesh(const MeshFile& file, const ObjMesh& obj, double uv_size_m
       control_mesh_of(obj, file.path.string(), file.mm_per_unit, uv_size_mm, shown);
   control.sharp_corners = file.sharp_corners;
   for (Vec3d& p : control.positions) p = file.placement.placed(p);
+  if (file.near_vertices)
+    control = drawn_to_vertices(std::move(control), kRounds, file.path.string());
   const EdgePieces pieces = pieces_for(file, cameras);
   const std::size_t triangles = limit_triangles(control, pieces);
   if (triangles > kMostTriangles) {

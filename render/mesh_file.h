@@ -54,6 +54,7 @@ struct MeshFile {
   int subdivide = 0;
   std::optional<double> subdivide_px;
   bool sharp_corners = true;
+  bool near_vertices = false;  // drawn_to_vertices()
   Placement placement;
   std::optional<TomlTable> table;  // that asked for it, for messages
 

@@ -159,6 +159,7 @@ MeshFile read_mesh(const TomlTable& table) {
   if (mesh.subdivide > 0 && mesh.subdivide_px)
     table.fail("subdivide_px", "expected only one of subdivide and subdivide_px");
   mesh.sharp_corners = table.choice("subdivide_corners", {"sharp", "round"}, "sharp") == "sharp";
+  mesh.near_vertices = table.choice("subdivide_vertices", {"cage", "near"}, "cage") == "near";
   mesh.placement = read_placement(table);
   mesh.table = table;
   return mesh;

@@ -168,6 +168,10 @@ void Shell::cut_prisms() {
 void Shell::thin_tight_folds(const ClothMesh& mesh, double thickness) {
   constexpr int kRounds = 60;
   constexpr double kThinner = 0.85;  // in each round
+  const auto is_flipped = [&](const Tet& tet) {
+    return edges(world_, tet.vertex).determinant() < 0;
+  };
+  if (std::none_of(tets_.begin(), tets_.end(), is_flipped)) return;
   // Vertices on both sides of a UV seam stay together: [surface vertex] the first at its place.
   std::vector<std::uint32_t> first(mesh.positions.size());
   std::map<std::array<double, 3>, std::uint32_t> first_at;
@@ -180,7 +184,7 @@ void Shell::thin_tight_folds(const ClothMesh& mesh, double thickness) {
     std::vector<std::uint8_t> is_too_thick(share.size(), 0);
     bool any = false;
     for (std::uint32_t tet = 0; tet < tets_.size(); ++tet) {
-      if (edges(world_, tets_[tet].vertex).determinant() >= 0) continue;
+      if (!is_flipped(tets_[tet])) continue;
       any = true;
       const std::array<std::uint32_t, 3>& t = triangles_[tet / 3];
       const Vec3d middle = (mesh.positions[t[1]] - mesh.positions[t[0]])
@@ -259,21 +263,32 @@ void Shell::connect_tets() {
 }
 
 void Shell::connect_triangles() {
-  std::map<std::pair<std::uint32_t, std::uint32_t>,
-           std::vector<std::pair<std::uint32_t, std::size_t>>>
-      edge_sides;
+  struct Side {
+    std::array<std::uint32_t, 2> edge;
+    std::uint32_t triangle;
+    std::uint32_t corner;  // opposite the edge
+  };
+  std::vector<Side> sides;
   triangle_neighbours_.assign(triangles_.size(), {kNone, kNone, kNone});
   for (std::uint32_t t = 0; t < triangles_.size(); ++t) {
-    for (std::size_t corner = 0; corner < 3; ++corner) {
-      const std::uint32_t i = triangles_[t][(corner + 1) % 3];
-      const std::uint32_t j = triangles_[t][(corner + 2) % 3];
-      edge_sides[std::minmax(i, j)].emplace_back(t, corner);
+    for (std::uint32_t corner = 0; corner < 3; ++corner) {
+      const auto [low, high] =
+          std::minmax({triangles_[t][(corner + 1) % 3], triangles_[t][(corner + 2) % 3]});
+      sides.push_back({{low, high}, t, corner});
     }
   }
-  for (const auto& [edge, sides] : edge_sides) {
-    if (sides.size() != 2) continue;
-    triangle_neighbours_[sides[0].first][sides[0].second] = sides[1].first;
-    triangle_neighbours_[sides[1].first][sides[1].second] = sides[0].first;
+  std::sort(sides.begin(), sides.end(),
+            [](const Side& a, const Side& b) { return a.edge < b.edge; });
+  for (std::size_t first = 0; first < sides.size();) {
+    std::size_t last = first + 1;
+    while (last < sides.size() && sides[last].edge == sides[first].edge) ++last;
+    if (last - first == 2) {
+      const Side& a = sides[first];
+      const Side& b = sides[first + 1];
+      triangle_neighbours_[a.triangle][a.corner] = b.triangle;
+      triangle_neighbours_[b.triangle][b.corner] = a.triangle;
+    }
+    first = last;
   }
 }
 

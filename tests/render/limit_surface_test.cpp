@@ -201,7 +201,9 @@ TEST(LimitSurfaceLaw, APlaneStaysAPlaneAndItsFabricStaysAffine) {
   for (const bool sharp : {true, false}) {
     ControlMesh mesh = flat_patches(map);
     mesh.sharp_corners = sharp;
-    const ClothMesh limit = limit_surface(mesh, pieces(5), "plane");
+    const int rounds = sharp ? 2 : 0;
+    const ClothMesh limit =
+        limit_surface(drawn_to_vertices(mesh, rounds, "plane"), pieces(5), "plane");
     for (std::size_t v = 0; v < limit.positions.size(); ++v) {
       EXPECT_LT(std::abs(limit.positions[v].z()), 1e-12);
       EXPECT_LT((limit.normals[v] - Vec3d(0, 0, 1)).norm(), 1e-9) << limit.positions[v].transpose();
@@ -366,6 +368,28 @@ TEST(LimitSurfaceLaw, AnInfinitelySharpCubeStaysACube) {
   const ClothMesh spike = limit_surface(mesh, pieces(4), "cube");
   EXPECT_LT((spike.positions[7] - Vec3d(1, 1, 1)).norm(), 1e-9);
   EXPECT_GT((spike.positions[0] - Vec3d(-1, -1, -1)).norm(), 0.5);
+}
+
+// Waves of four edges along a wide sheet lose (4 + 2 cos(90 deg)) / 6 = 2/3 of their height in the
+// limit; every round leaves a third of what was lacking.
+TEST(LimitSurfaceLaw, ASurfaceCanBeDrawnToItsVertices) {
+  ControlMesh mesh = grid([](std::uint32_t i, std::uint32_t j) {
+    return Vec3d(i, j, i % 4 == 1 ? 1.0 : (i % 4 == 3 ? -1.0 : 0.0));
+  });
+  const std::uint32_t crest = at(3, 3);
+  for (int rounds = 0; rounds <= 2; ++rounds) {
+    const ClothMesh limit =
+        limit_surface(drawn_to_vertices(mesh, rounds, "waves"), pieces(1), "waves");
+    const double expected = -(1 - std::pow(1.0 / 3, rounds + 1));
+    // The sheet ends three edges away.
+    EXPECT_NEAR(limit.positions[crest].z(), expected, rounds == 0 ? 1e-12 : 0.02) << rounds;
+  }
+  const ControlMesh rough = rough_sheet();
+  const ClothMesh limit = limit_surface(drawn_to_vertices(rough, 200, "sheet"), pieces(1), "sheet");
+  for (std::size_t v = 0; v < rough.positions.size(); ++v) {
+    EXPECT_LT((limit.positions[v] - rough.positions[v]).norm(), 1e-6);
+    EXPECT_LT((limit.fabric[v] - rough.fabric[v]).norm(), 1e-6);
+  }
 }
 
 // Polygons without any order: edges of many faces, vertices that only touch.

@@ -248,7 +248,8 @@ TEST_F(SceneConfigTest, MeshesAreSubdividedGroupedAndPlacedIfAsked) {
   std::string text =
       with(kScene, "uv_size_mm = 300\n",
            "uv_size_mm = 300\ngroup = \"sleeve\"\nsubdivide = 2\nsubdivide_corners = "
-           "\"round\"\nuv_turn_deg = 90\nuv_offset_mm = [3, 4]\nuv_tiling = [5, 6]\nthickness = "
+           "\"round\"\nsubdivide_vertices = \"near\"\nuv_turn_deg = 90\nuv_offset_mm = [3, "
+           "4]\nuv_tiling = [5, 6]\nthickness = "
            "1.5\n" +
                place);
   text = with(text, "flat_mm = [30, 20]\n", "flat_mm = [30, 20]\n" + place);
@@ -258,6 +259,7 @@ TEST_F(SceneConfigTest, MeshesAreSubdividedGroupedAndPlacedIfAsked) {
   EXPECT_EQ(mesh.group, "sleeve");
   EXPECT_EQ(mesh.subdivide, 2);
   EXPECT_FALSE(mesh.sharp_corners);
+  EXPECT_TRUE(mesh.near_vertices);
   EXPECT_EQ(scene.cloths[0].thickness, 1.5);
   EXPECT_NEAR(scene.cloths[0].on_uvs.turn, radians(90), 1e-12);
   EXPECT_EQ(scene.cloths[0].on_uvs.offset_mm, Eigen::Vector2d(3, 4));
