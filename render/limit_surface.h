@@ -50,7 +50,7 @@ using EdgePieces = std::function<int(const Vec3d& a, const Vec3d& b)>;
 
 /// A mesh whose limit surface passes near the vertices of `mesh` instead of inside of them: each
 /// round moves vertices by what the surface still lacks. Waves of four edges keep 96 % of their
-/// height after 2 rounds (67 % before); the finest ones, of two edges, 40 % (11 to 33 %), so noise
+/// height after 2 rounds (67 % before), the finest ones, of two edges, 70 % (33 % before), so noise
 /// is not drawn in full. Fabric coordinates likewise. Errors: as limit_surface().
 ControlMesh drawn_to_vertices(ControlMesh mesh, int rounds, const std::string& name);
 

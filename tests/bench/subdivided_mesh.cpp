@@ -3,7 +3,7 @@
 // with:
 //
 //   heddle_subdivided_mesh MESH [--unit-mm U] [--uv-size-mm S] [--levels 0 1 2] [--thickness-mm T]
-//     [-o FINE.obj]
+//     [--near] [-o FINE.obj]
 //
 // seconds: of reading and subdividing, of the shell, of the ray-tracing structure of its faces.
 // RSS: peak of the process so far, so levels should rise.
@@ -86,6 +86,7 @@ int main(int argc, char** argv) {
   app.add_option("--uv-size-mm", setup.uv_size_mm, "millimetres per unit of UV");
   app.add_option("--levels", setup.levels, "levels of subdivision");
   app.add_option("--thickness-mm", setup.thickness_mm, "thickness of the shell");
+  app.add_flag("--near", setup.mesh.near_vertices, "draw the surface to the vertices");
   app.add_option("-o", setup.output, "OBJ file of the last level");
   CLI11_PARSE(app, argc, argv);
   heddle::measure(setup);

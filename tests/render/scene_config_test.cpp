@@ -274,7 +274,7 @@ TEST_F(SceneConfigTest, MeshesAreSubdividedGroupedAndPlacedIfAsked) {
   EXPECT_NE(message(with(text, "subdivide_px = 4", "subdivide_px = 4\nsubdivide = 1"))
                 .find("only one of subdivide and subdivide_px"),
             std::string::npos);
-  EXPECT_NE(message(with(text, "subdivide = 2", "subdivide = 9")).find("scene.toml:24:"),
+  EXPECT_NE(message(with(text, "subdivide = 2", "subdivide = 9")).find("scene.toml:23:"),
             std::string::npos);
   EXPECT_NE(message(with(text, "thickness = 1.5", "thickness = 0")).find("thickness"),
             std::string::npos);
