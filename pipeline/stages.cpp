@@ -39,7 +39,7 @@ constexpr std::uint32_t kForecastProbes = 24;
 // needs a new number: its key holds it, and what the old one made is then found no more.
 int version_of(std::string_view stage) {
   static const std::map<std::string_view, int> versions = {
-      {"geometry", 1},        {"synth", 2},    {"maps", 3}, {"ssdf", 1},     {"sg", 1},
+      {"geometry", 1},        {"synth", 3},    {"maps", 3}, {"ssdf", 1},     {"sg", 1},
       {"transfer", 5},        {"voxelize", 2}, {"pack", 1}, {"accuracy", 8}, {"surface-maps", 1},
       {"surface-weights", 2},
   };

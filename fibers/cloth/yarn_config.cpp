@@ -181,6 +181,7 @@ YarnConfig read_yarn(const TomlTable& table, const std::string& name,
   const FiberType fiber = fibers[static_cast<std::size_t>(yarn.fiber)];
   if (table.has("color")) yarn.fiber = dyed_fiber(yarn.fiber, read_color(table, "color"), fibers);
   yarn.contact_flattening = table.number("contact_flattening", {.min = 0, .max = 0.5}, 0);
+  yarn.spread = table.optional_number("spread", {.min = 0, .max = 1}).value_or(0);
   if (table.has("from")) {
     read_yarn_file(table, fiber.radius_mm, yarn);
     return yarn;

@@ -33,6 +33,8 @@ struct YarnConfig {
   double spacing_mm = 0;
   // share of its height that it loses where it is pressed hardest, 0 .. 0.5
   double contact_flattening = 0;
+  // share of the free room beside it in the plane of the cloth that a woven yarn takes, 0 .. 1
+  double spread = 0;
   int plies = 1;
   int fibers_per_ply = 1;
   // twist of the plies about the yarn, positive = Z; snapped to whole turns per tile

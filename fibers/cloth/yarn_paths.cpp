@@ -4,6 +4,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -31,8 +32,12 @@ constexpr double kRelaxation = 0.7;
 constexpr double kLargestConflict = 0.05;
 // Sections are flattened by the forces that were found, and laid again, so many times.
 constexpr int kFlatteningRounds = 3;
-// Between flattened neighbours so much room is left, in half heights of the yarns that pass there.
+// Between widened neighbours so much room is left, in half heights of the yarn that passes there.
 constexpr double kPassage = 1;
+// Places across a yarn at which the yarn that it crosses is measured.
+constexpr std::size_t kPlacesAcross = 5;
+// A section changes over at least this share of the way from one crossing to the next.
+constexpr double kShortestChange = 0.5;
 constexpr double kNothing = std::numeric_limits<double>::infinity();
 
 double section(double distance, double half_width, double half_height) {
@@ -51,28 +56,36 @@ YarnPlaces places(const FabricConfig& config, const ThreadSystem& system, int co
   return result;
 }
 
+/// A yarn's section at one crossing.
+struct Section {
+  double half_width = 0;
+  double half_height = 0;
+  double shift = 0;  // of its middle, across the yarn
+};
+
+/// How thick the crossed yarn is where a yarn meets it, at the yarn's samples.
+struct Bump {
+  std::ptrdiff_t first = 0;   // sample; may lie before the repeat or behind it
+  std::vector<double> thick;  // [sample from there on]
+};
+
 /// The yarns of one system over one repeat, and what is known of them so far.
 struct System {
   std::vector<double> centre;  // [yarn] across it
   std::vector<double> room;    // [yarn] its spacing
-  std::vector<double> width;   // [yarn] half of the section, flattened nowhere
+  std::vector<double> width;   // [yarn] half of the section, as long as nothing changes it
   std::vector<double> height;  // [yarn]
   std::vector<double> yield;   // [yarn] how far contact flattens it
-  std::vector<double> widest;  // [yarn] half of the section: others must pass beside it
+  std::vector<double> spread;  // [yarn] share of the free room beside it that it takes
   double period = 0;           // across all yarns of the repeat
   double tension = 0;
-  std::vector<std::vector<double>> heights;   // [yarn][sample]
-  std::vector<std::vector<double>> flatness;  // [yarn][crossing] height of the section, relative
-  std::vector<std::vector<double>> force;     // [yarn][crossing] away from the yarn that it crosses
-  std::vector<double> conflict;               // [yarn] mm
+  std::vector<std::vector<double>> heights;    // [yarn][sample]
+  std::vector<std::vector<Section>> sections;  // [yarn][crossing]
+  std::vector<std::vector<Bump>> bumps;        // [yarn][crossing]
+  std::vector<std::vector<double>> force;  // [yarn][crossing] away from the yarn that it crosses
+  std::vector<double> conflict;            // [yarn] mm
 
   std::size_t count() const { return centre.size(); }
-  double half_height(std::size_t yarn, std::size_t crossing) const {
-    return height[yarn] * flatness[yarn][crossing];
-  }
-  double half_width(std::size_t yarn, std::size_t crossing) const {
-    return std::min(width[yarn] / flatness[yarn][crossing], widest[yarn]);
-  }
 };
 
 /// Widens a floor (sign 1) or ceiling (-1) of a periodic line so that nothing steeper is needed to
@@ -97,17 +110,14 @@ class Loom {
     warp_.tension = 1 - config.crimp_warp;
     weft_.tension = config.crimp_warp;
     for (System* own : {&warp_, &weft_}) {
-      const System& other = own == &warp_ ? weft_ : warp_;
-      const double thickest = *std::max_element(other.height.begin(), other.height.end());
-      for (std::size_t yarn = 0; yarn < own->count(); ++yarn) {
-        own->widest.push_back(
-            std::max(own->width[yarn], 0.5 * (own->room[yarn] - kPassage * thickest)));
-      }
-      own->flatness.assign(own->count(), std::vector<double>(other.count(), 1.0));
+      const System& other = crossed_by(*own);
+      own->sections.assign(own->count(), std::vector<Section>(other.count()));
+      own->bumps.assign(own->count(), std::vector<Bump>(other.count()));
       own->force.assign(own->count(), std::vector<double>(other.count(), 0.0));
       own->heights.resize(own->count());
       own->conflict.assign(own->count(), 0);
     }
+    shape_sections();
     plane_.assign(warp_.count() * weft_.count(), 0);
   }
 
@@ -118,8 +128,7 @@ class Loom {
     }
     balance();
     for (int round = 0; yields && round < kFlatteningRounds; ++round) {
-      flatten(warp_);
-      flatten(weft_);
+      shape_sections();
       balance();
     }
   }
@@ -144,9 +153,10 @@ class Loom {
       shape.step_mm = step_of(own);
       shape.height_mm = own.heights[yarn];
       for (std::size_t i = 0; i < shape.height_mm.size(); ++i) {
-        const auto [width, height] = section_at(own, yarn, shape.step_mm * static_cast<double>(i));
-        shape.half_width_mm.push_back(width);
-        shape.half_height_mm.push_back(height);
+        const Section at = section_at(own, yarn, shape.step_mm * static_cast<double>(i));
+        shape.shift_mm.push_back(at.shift);
+        shape.half_width_mm.push_back(at.half_width);
+        shape.half_height_mm.push_back(at.half_height);
       }
       shapes.push_back(std::make_shared<const YarnShape>(std::move(shape)));
     }
@@ -166,6 +176,7 @@ class Loom {
       result.width.push_back(0.5 * yarn.width_mm);
       result.height.push_back(0.5 * yarn.height_mm);
       result.yield.push_back(yarn.contact_flattening);
+      result.spread.push_back(yarn.spread);
     }
     return result;
   }
@@ -187,20 +198,16 @@ class Loom {
                           : plane_[crossing * weft_.count() + yarn];
   }
 
-  /// Calls visit(sample, distance from the crossed yarn's axis) for the samples of a yarn that lie
-  /// over or under the yarn of a crossing.
+  /// Calls visit(sample, thickness of the crossed yarn) for the samples of a yarn that lie over or
+  /// under the yarn of a crossing.
   template <class Visit>
   void for_each_sample(const System& own, std::size_t yarn, std::size_t crossing,
                        Visit&& visit) const {
-    const System& other = crossed_by(own);
-    const double step = step_of(own);
     const auto samples = static_cast<std::ptrdiff_t>(samples_of(own));
-    const double half = other.half_width(crossing, yarn);
-    const double centre = other.centre[crossing];
-    for (auto i = static_cast<std::ptrdiff_t>(std::ceil((centre - half) / step));
-         static_cast<double>(i) * step <= centre + half; ++i) {
-      visit(static_cast<std::size_t>((i + samples) % samples),
-            static_cast<double>(i) * step - centre);
+    const Bump& bump = own.bumps[yarn][crossing];
+    for (std::size_t k = 0; k < bump.thick.size(); ++k) {
+      const std::ptrdiff_t i = bump.first + static_cast<std::ptrdiff_t>(k);
+      visit(static_cast<std::size_t>((i + samples) % samples), bump.thick[k]);
     }
   }
 
@@ -213,9 +220,7 @@ class Loom {
     for (std::size_t crossing = 0; crossing < other.count(); ++crossing) {
       const bool above = lies_above(own, yarn, crossing);
       const double level = plane(own, yarn, crossing);
-      for_each_sample(own, yarn, crossing, [&](std::size_t i, double distance) {
-        const double thick = kSectionAllowance * section(distance, other.half_width(crossing, yarn),
-                                                         other.half_height(crossing, yarn));
+      for_each_sample(own, yarn, crossing, [&](std::size_t i, double thick) {
         if (above) {
           floor[i] = std::max(floor[i], level + thick);
         } else {
@@ -279,39 +284,105 @@ class Loom {
     }
   }
 
-  /// Flattens each yarn by the share of the largest force that presses on it.
-  void flatten(System& own) {
+  void shape_sections() {
+    shape_sections(warp_);
+    shape_sections(weft_);
+    find_bumps(warp_);
+    find_bumps(weft_);
+  }
+
+  /// Each yarn yields by the share of the largest force that presses on it, and spreads into the
+  /// room that is free beside it. What it loses in height it gains in width, if there is room.
+  void shape_sections(System& own) {
     double largest = 0;
     for (const std::vector<double>& forces : own.force) {
       for (const double force : forces) largest = std::max(largest, force);
     }
-    if (!(largest > 0)) return;
     for (std::size_t yarn = 0; yarn < own.count(); ++yarn) {
       for (std::size_t crossing = 0; crossing < crossed_by(own).count(); ++crossing) {
-        own.flatness[yarn][crossing] =
-            1 - own.yield[yarn] * std::min(1.0, own.force[yarn][crossing] / largest);
+        const double pressed = largest > 0 ? own.force[yarn][crossing] / largest : 0;
+        const double flat = 1 - own.yield[yarn] * std::min(1.0, pressed);
+        const double width = own.width[yarn];
+        const auto reach = [&](int side) {
+          const double most = std::max(width, room_beside(own, yarn, crossing, side));
+          return std::min(most, std::max(width / flat, width + own.spread[yarn] * (most - width)));
+        };
+        const double below = reach(-1);
+        const double above = reach(1);
+        Section& shape = own.sections[yarn][crossing];
+        shape.half_width = 0.5 * (below + above);
+        shape.half_height = own.height[yarn] * std::min(flat, width / shape.half_width);
+        shape.shift = 0.5 * (above - below);
       }
     }
   }
 
-  /// Half width and half height of a yarn's section at a distance along it: over the yarns that it
-  /// crosses those of the crossing, between them a blend.
-  std::pair<double, double> section_at(const System& own, std::size_t yarn, double along) const {
+  /// The crossed yarn changes across the width of its crossing: the thickest that it is there
+  /// counts.
+  void find_bumps(System& own) const {
     const System& other = crossed_by(own);
+    const double step = step_of(own);
+    for (std::size_t yarn = 0; yarn < own.count(); ++yarn) {
+      for (std::size_t crossing = 0; crossing < other.count(); ++crossing) {
+        const Section& shape = own.sections[yarn][crossing];
+        std::array<Section, kPlacesAcross> crossed;
+        double low = kNothing;
+        double high = -kNothing;
+        for (std::size_t k = 0; k < kPlacesAcross; ++k) {
+          const double across =
+              shape.half_width * (2.0 * static_cast<double>(k) / (kPlacesAcross - 1) - 1);
+          crossed[k] = section_at(other, crossing, own.centre[yarn] + shape.shift + across);
+          low = std::min(low, crossed[k].shift - crossed[k].half_width);
+          high = std::max(high, crossed[k].shift + crossed[k].half_width);
+        }
+        const double centre = other.centre[crossing];
+        Bump& bump = own.bumps[yarn][crossing];
+        bump.first = static_cast<std::ptrdiff_t>(std::ceil((centre + low) / step));
+        bump.thick.clear();
+        for (std::ptrdiff_t i = bump.first; static_cast<double>(i) * step <= centre + high; ++i) {
+          const double distance = static_cast<double>(i) * step - centre;
+          double thick = 0;
+          for (const Section& at : crossed)
+            thick = std::max(thick, section(distance - at.shift, at.half_width, at.half_height));
+          bump.thick.push_back(kSectionAllowance * thick);
+        }
+      }
+    }
+  }
+
+  /// How far a section may reach from its yarn's axis to one side (-1 or 1). Neighbours on the same
+  /// side of the yarn that they cross may touch; else that yarn passes between them.
+  double room_beside(const System& own, std::size_t yarn, std::size_t crossing, int side) const {
+    const std::size_t n = own.count();
+    const std::size_t next = (yarn + (side > 0 ? 1 : n - 1)) % n;
+    const bool passes = lies_above(own, yarn, crossing) != lies_above(own, next, crossing);
+    const double passage = passes ? kPassage * crossed_by(own).height[crossing] : 0;
+    return 0.5 * (own.room[yarn] - passage);
+  }
+
+  /// A yarn's section at a distance along it: over the yarns that it crosses that of the crossing,
+  /// between them a blend.
+  Section section_at(const System& own, std::size_t yarn, double along) const {
+    const System& other = crossed_by(own);
+    along -= other.period * std::floor(along / other.period);
     const std::size_t n = other.count();
     const auto after_place = std::upper_bound(other.centre.begin(), other.centre.end(), along);
     const auto after = static_cast<std::size_t>(after_place - other.centre.begin());
     const std::size_t before = (after + n - 1) % n;
-    const double begin =
-        other.centre[before] - (after == 0 ? other.period : 0) + other.half_width(before, yarn);
-    const double end = other.centre[after % n] + (after == n ? other.period : 0) -
-                       other.half_width(after % n, yarn);
-    const double share = end > begin ? std::clamp((along - begin) / (end - begin), 0.0, 1.0)
-                                     : (along < begin ? 0.0 : 1.0);
+    const Section& crossed_before = other.sections[before][yarn];
+    const Section& crossed_after = other.sections[after % n][yarn];
+    const double from = other.centre[before] - (after == 0 ? other.period : 0);
+    const double to = other.centre[after % n] + (after == n ? other.period : 0);
+    const double begin = from + crossed_before.shift + crossed_before.half_width;
+    const double end = to + crossed_after.shift - crossed_after.half_width;
+    const double length = std::max(end - begin, kShortestChange * (to - from));
+    const double share = std::clamp((along - 0.5 * (begin + end)) / length + 0.5, 0.0, 1.0);
     const double t = 0.5 - 0.5 * std::cos(kPi * share);
-    const auto blend = [t](double a, double b) { return a + t * (b - a); };
-    return {blend(own.half_width(yarn, before), own.half_width(yarn, after % n)),
-            blend(own.half_height(yarn, before), own.half_height(yarn, after % n))};
+    const Section& a = own.sections[yarn][before];
+    const Section& b = own.sections[yarn][after % n];
+    const auto blend = [t](double x, double y) { return x + t * (y - x); };
+    return {blend(a.half_width, b.half_width), blend(a.half_height, b.half_height),
+            blend(a.shift, b.shift)};
   }
 
   const Weave& weave_;
@@ -400,6 +471,10 @@ double YarnShape::height_at(double along_mm) const {
          0.5 * t * (p2 - p0 + t * (2 * p0 - 5 * p1 + 4 * p2 - p3 + t * (3 * (p1 - p2) + p3 - p0)));
 }
 
+double YarnShape::shift_at(double along_mm) const {
+  return linear_at(shift_mm, step_mm, along_mm);
+}
+
 double YarnShape::half_width_at(double along_mm) const {
   return linear_at(half_width_mm, step_mm, along_mm);
 }
@@ -422,8 +497,8 @@ CentreLine centre_line(const YarnPath& path) {
   const Vec3d side = path.is_warp ? Vec3d(-1, 0, 0) : across;
   return {[=](double share) {
             const double s = share * path.length_mm;
-            const Vec3d position =
-                path.across_mm * across + s * along + path.shape->height_at(s) * Vec3d(0, 0, 1);
+            const Vec3d position = (path.across_mm + path.shape->shift_at(s)) * across + s * along +
+                                   path.shape->height_at(s) * Vec3d(0, 0, 1);
             return YarnPlace{position, side, Vec3d(0, 0, 1), path.shape->half_width_at(s),
                              path.shape->half_height_at(s)};
           },
@@ -471,12 +546,14 @@ double smallest_clearance(const FabricConfig& config, const YarnPaths& paths, in
           config.weave.is_warp_up(static_cast<int>(end), static_cast<int>(pick)) ? 1 : -1;
       const double width = warp.shape->half_width_at(weft.across_mm);
       const double depth = weft.shape->half_width_at(warp.across_mm);
+      const double middle_x = warp.across_mm + warp.shape->shift_at(weft.across_mm);
+      const double middle_y = weft.across_mm + weft.shape->shift_at(warp.across_mm);
       for (int iy = 0; iy < samples; ++iy) {
-        const double dy = depth * (2.0 * iy / (samples - 1) - 1);
+        const double y = middle_y + depth * (2.0 * iy / (samples - 1) - 1);
         for (int ix = 0; ix < samples; ++ix) {
-          const double dx = width * (2.0 * ix / (samples - 1) - 1);
-          const double y = weft.across_mm + dy;
-          const double x = warp.across_mm + dx;
+          const double x = middle_x + width * (2.0 * ix / (samples - 1) - 1);
+          const double dx = x - warp.across_mm - warp.shape->shift_at(y);
+          const double dy = y - weft.across_mm - weft.shape->shift_at(x);
           const double gap = sign * (warp.shape->height_at(y) - weft.shape->height_at(x));
           const double needed =
               section(dx, warp.shape->half_width_at(y), warp.shape->half_height_at(y)) +

@@ -8,8 +8,9 @@
 // that it passes away from it, and so on through the whole weave.
 //
 // A yarn's section is an ellipse in the vertical plane across it, and stays upright: slopes shear
-// it. Where yarns press on each other they may be flattened; they grow as much wider, up to their
-// spacing. Tested in tests/fibers/cloth/yarn_paths_test.cpp.
+// it. Where yarns press on each other they may be flattened; they grow as much wider. They may also
+// spread into the room beside them: up to their neighbour, or up to the yarn that passes between.
+// Tested in tests/fibers/cloth/yarn_paths_test.cpp.
 
 #include <memory>
 #include <vector>
@@ -32,11 +33,13 @@ YarnPlaces weft_places(const FabricConfig& config);
 struct YarnShape {
   double step_mm = 0;                  // between samples
   std::vector<double> height_mm;       // [sample] over the middle plane, from 0 along the yarn on
+  std::vector<double> shift_mm;        // [sample] of the section's middle, across the yarn
   std::vector<double> half_width_mm;   // [sample]
   std::vector<double> half_height_mm;  // [sample]
 
   /// At a distance along the yarn; a smooth curve through the samples.
   double height_at(double along_mm) const;
+  double shift_at(double along_mm) const;
   double half_width_at(double along_mm) const;
   double half_height_at(double along_mm) const;
   /// By how much the yarn is longer than its repeat, relative: what the trade calls crimp.

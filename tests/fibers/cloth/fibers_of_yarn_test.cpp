@@ -18,8 +18,8 @@ namespace {
 
 CentreLine flat_yarn(const YarnConfig& yarn, double length_mm, bool is_warp) {
   const auto shape = std::make_shared<const YarnShape>(YarnShape{
-      length_mm / 4, std::vector<double>(4, 0.0), std::vector<double>(4, 0.5 * yarn.width_mm),
-      std::vector<double>(4, 0.5 * yarn.height_mm)});
+      length_mm / 4, std::vector<double>(4, 0.0), std::vector<double>(4, 0.0),
+      std::vector<double>(4, 0.5 * yarn.width_mm), std::vector<double>(4, 0.5 * yarn.height_mm)});
   return centre_line({is_warp, 0.5, length_mm, shape});
 }
 

@@ -43,6 +43,38 @@ TEST(YarnPathsLaw, CrestsGoOverAndUnderAsTheWeaveSays) {
   }
 }
 
+// Yarns that spread take all room up to a neighbour on the same side, leave a passage beside the
+// others, keep the area of their section, and still do not overlap.
+TEST(YarnPathsLaw, SpreadYarnsTouchTheirNeighboursInFloats) {
+  FabricConfig config = test::small_fabric("satin 5/2");
+  for (YarnConfig& yarn : config.yarns) {
+    yarn.height_mm = 0.1;
+    yarn.spread = 1;
+  }
+  const YarnPaths paths = lay_yarns(config);
+  EXPECT_GE(smallest_clearance(config, paths, 151), 0);
+  int touching = 0;
+  for (std::size_t end = 0; end < 5; ++end) {
+    const YarnPath& left = paths.warp[end];
+    const YarnPath& right = paths.warp[(end + 1) % 5];
+    const double apart = end + 1 < 5 ? right.across_mm - left.across_mm : config.warp.spacing_mm;
+    for (std::size_t pick = 0; pick < 5; ++pick) {
+      const double y = paths.weft[pick].across_mm;
+      const double gap = apart + right.shape->shift_at(y) - right.shape->half_width_at(y) -
+                         left.shape->shift_at(y) - left.shape->half_width_at(y);
+      const auto up = [&](std::size_t e) {
+        return config.weave.is_warp_up(static_cast<int>(e % 5), static_cast<int>(pick));
+      };
+      const bool touches = up(end) == up(end + 1);
+      touching += touches ? 1 : 0;
+      EXPECT_NEAR(gap, touches ? 0 : 0.5 * config.yarns[1].height_mm, 1e-9) << end << ' ' << pick;
+      EXPECT_NEAR(4 * left.shape->half_width_at(y) * left.shape->half_height_at(y),
+                  config.yarns[0].width_mm * config.yarns[0].height_mm, 1e-6);
+    }
+  }
+  EXPECT_EQ(touching, 15);
+}
+
 // Peirce 1937: in plain cloth the two systems' rises add up to the sum of the yarns' heights. A
 // string rises against its pull, so equal systems share in the inverse ratio of their pulls.
 TEST(YarnPathsLaw, SystemsShareTheCrimpOfPlainCloth) {
