@@ -66,6 +66,16 @@ TEST_F(MeshFileTest, WithoutKeysItIsTheFile) {
   EXPECT_EQ(black.triangles.size(), 32U);
 }
 
+// The file's normals say which side is the face, also where they oppose the winding.
+TEST_F(MeshFileTest, TheFaceIsWhereTheFilesNormalsPoint) {
+  for (const char* z : {"1", "-1"}) {
+    MeshFile mesh = file(std::string("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvn 0 0 ") + z +
+                         "\nf 1/1/1 2/1/1 3/1/1 4/1/1\n");
+    mesh.subdivide = 1;
+    for (const Vec3d& normal : cloth(mesh).normals) EXPECT_NEAR(normal.z(), std::stod(z), 1e-9);
+  }
+}
+
 // Scaled, turned about x, then y, then z of the world, and moved.
 TEST(PlacementLaw, StepsFollowOneAnother) {
   const double quarter = kPi / 2;
