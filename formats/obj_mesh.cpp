@@ -2,10 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <map>
+#include <set>
 #include <string_view>
+#include <utility>
 
 #include "formats/atomic_file.h"
 #include "formats/input_error.h"
@@ -16,6 +19,7 @@ namespace {
 
 constexpr std::size_t kMaxTriangles = 50'000'000;
 constexpr std::int64_t kAbsent = -1;
+constexpr float kSharpest = 10;  // OpenSubdiv's infinity
 
 /// Indices of one corner from 0, kAbsent if not given.
 struct Corner {
@@ -68,9 +72,87 @@ class Parser {
       normals_.push_back(unit_vector(numbers<3>(rest, "normal")));
     } else if (keyword == "f") {
       add_face(rest);
+    } else if (keyword == "g") {
+      groups_.clear();
+      for (std::string_view name = next_word(rest); !name.empty(); name = next_word(rest))
+        groups_.emplace_back(name);
+      is_new_part_ = true;
+    } else if (keyword == "o") {
+      object_ = std::string(trimmed(rest));
+      is_new_part_ = true;
+    } else if (keyword == "t") {
+      add_tag(rest);
     }
-    // Everything else (materials, groups, lines, ...) has no meaning here; files named by it are
-    // never opened.
+    // Everything else (materials, lines, ...) has no meaning here; files named by it are never
+    // opened.
+  }
+
+  static std::string_view trimmed(std::string_view text) {
+    constexpr std::string_view kBlank = " \t\r";
+    text.remove_prefix(std::min(text.find_first_not_of(kBlank), text.size()));
+    return text.substr(0, text.find_last_not_of(kBlank) + 1);
+  }
+
+  /// The part that the next face belongs to.
+  std::uint32_t current_part() {
+    if (!is_new_part_) return part_;
+    std::vector<std::string> names = groups_;
+    if (!object_.empty()) names.push_back(object_);
+    const auto [place, is_new] =
+        parts_.try_emplace(names, static_cast<std::uint32_t>(mesh_.parts.size()));
+    if (is_new) mesh_.parts.push_back(std::move(names));
+    is_new_part_ = false;
+    return part_ = place->second;
+  }
+
+  /// A whole number of a tag, not negative.
+  std::size_t count_in(std::string_view text) const {
+    std::size_t value = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (text.empty() || error != std::errc() || end != text.data() + text.size())
+      fail(fmt::format("'{}' is no whole number of a tag", text));
+    return value;
+  }
+
+  /// "NAME integers/numbers/strings" and so many of each; only creases and corners have a meaning.
+  void add_tag(std::string_view rest) {
+    const std::string_view name = next_word(rest);
+    if (name != "crease" && name != "corner") return;
+    std::string_view counts = next_word(rest);
+    std::array<std::size_t, 3> count = {};
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::size_t slash = std::min(counts.find('/'), counts.size());
+      count[k] = count_in(counts.substr(0, slash));
+      counts.remove_prefix(std::min(slash + 1, counts.size()));
+    }
+    std::vector<std::size_t> vertices;
+    for (std::size_t k = 0; k < count[0]; ++k) {
+      const std::size_t vertex = count_in(next_word(rest));
+      if (vertex >= positions_.size())
+        fail(fmt::format("tag {}: vertex {} of {}, from 0", name, vertex, positions_.size()));
+      vertices.push_back(vertex);
+    }
+    std::vector<float> sharpness;
+    for (std::size_t k = 0; k < count[1]; ++k) {
+      const std::string_view word = next_word(rest);
+      sharpness.push_back(numbers<1>(word, "sharpness")[0]);
+      if (sharpness.back() < 0) fail(fmt::format("tag {}: a sharpness below 0", name));
+      sharpness.back() = std::min(sharpness.back(), kSharpest);
+    }
+    const std::size_t each = name == "crease" ? 2 : 1;
+    const std::size_t places = vertices.size() / each;
+    if (vertices.size() % each != 0 || (sharpness.size() != 1 && sharpness.size() != places))
+      fail(fmt::format("tag {}: expected {}, and one sharpness or one for each", name,
+                       each == 2 ? "pairs of vertices" : "vertices"));
+    for (std::size_t k = 0; k < places; ++k) {
+      const float here = sharpness[sharpness.size() == 1 ? 0 : k];
+      if (each == 2) {
+        mesh_.sharp_edges.push_back(
+            {{positions_[vertices[2 * k]], positions_[vertices[2 * k + 1]]}, here, line_});
+      } else {
+        mesh_.sharp_vertices.push_back({positions_[vertices[k]], here});
+      }
+    }
   }
 
   /// The first N numbers of a line; more may follow (weights, vertex colours).
@@ -161,7 +243,7 @@ class Parser {
     ++faces_;
     std::uint32_t first = 0;
     std::uint32_t previous = 0;
-    int corners = 0;
+    std::uint32_t corners = 0;
     for (std::string_view word = next_word(rest); !word.empty(); word = next_word(rest)) {
       const Corner parsed = corner(word);
       if (mesh_.positions.empty()) {
@@ -184,6 +266,8 @@ class Parser {
       ++corners;
     }
     if (corners < 3) fail(fmt::format("face {} has {} corners", faces_, corners));
+    mesh_.face_corners.push_back(corners);
+    mesh_.face_part.push_back(current_part());
   }
 
   std::filesystem::path path_;
@@ -196,6 +280,11 @@ class Parser {
   std::vector<std::array<float, 2>> uvs_;
   std::vector<std::array<float, 3>> normals_;
   std::map<Corner, std::uint32_t> vertices_;
+  std::vector<std::string> groups_;  // of the faces that follow
+  std::string object_;
+  bool is_new_part_ = true;
+  std::uint32_t part_ = 0;
+  std::map<std::vector<std::string>, std::uint32_t> parts_;
   ObjMesh mesh_;
 };
 
@@ -204,6 +293,22 @@ class Parser {
 ObjMesh read_obj(const std::filesystem::path& path, const ObjUnits& units) {
   const std::vector<std::byte> bytes = read_whole_file(path);
   return Parser(path, units).parse({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+}
+
+std::vector<std::string> group_names(const ObjMesh& mesh) {
+  std::set<std::string> names;
+  for (const std::vector<std::string>& part : mesh.parts) names.insert(part.begin(), part.end());
+  return {names.begin(), names.end()};
+}
+
+std::vector<std::uint8_t> triangles_of_group(const ObjMesh& mesh, const std::string& name) {
+  std::vector<std::uint8_t> result;
+  for (std::size_t face = 0; face < mesh.face_corners.size(); ++face) {
+    const std::vector<std::string>& names = mesh.parts[mesh.face_part[face]];
+    const bool is_in = std::find(names.begin(), names.end(), name) != names.end();
+    result.insert(result.end(), mesh.face_corners[face] - 2, is_in ? 1 : 0);
+  }
+  return result;
 }
 
 }  // namespace heddle

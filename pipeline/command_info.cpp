@@ -288,6 +288,9 @@ Report describe_obj(const fs::path& path) {
   }
   Report report = {
       {"kind", "mesh"}, {"vertices", mesh.positions.size()}, {"triangles", mesh.triangles.size()}};
+  report["polygons"] = mesh.face_corners.size();
+  if (const std::vector<std::string> groups = group_names(mesh); !groups.empty())
+    report["groups"] = groups;
   report["has_uv"] = !mesh.uvs.empty();
   report["has_normals"] = !mesh.normals.empty();
   add_box(mesh.positions, report);

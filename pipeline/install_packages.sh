@@ -5,7 +5,7 @@ set -euo pipefail
 
 packages=(
   g++ cmake ninja-build pkg-config
-  libembree-dev libopenvdb-dev libboost-iostreams-dev libeigen3-dev libopenexr-dev libtbb-dev
+  libembree-dev libopenvdb-dev libboost-iostreams-dev libeigen3-dev libopenexr-dev libtbb-dev libosd-dev
   libtomlplusplus-dev libcli11-dev nlohmann-json3-dev libfmt-dev libpng-dev zlib1g-dev libxxhash-dev
   libgtest-dev libbenchmark-dev python3 python3-numpy
 )

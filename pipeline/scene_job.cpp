@@ -256,6 +256,10 @@ std::string SceneJob::picture_key(const PictureRequest& request) {
     if (cloth.surface) values.emplace_back("surface", cloth.surface->text);
     if (cloth.pattern) values.emplace_back("pattern", content_hash_of_file(cloth.pattern->picture));
   }
+  if (is_cut_for_pictures(config_)) {
+    for (const ViewConfig& view : config_.views)
+      values.emplace_back("cut_for", camera_text(view.camera));
+  }
   for (const std::string& surface : surface_stages().keys())
     values.emplace_back("interactive", surface);
   for (const std::size_t k : variant_.stand_ins)
@@ -460,6 +464,7 @@ PictureResult SceneJob::render(const PictureRequest& request, const std::string&
   result.failed_shell_walks = loaded.scene->failed_walks();
   result.flipped_tetrahedra = loaded.scene->flipped_tets();
   result.degenerate_tetrahedra = loaded.scene->degenerate_tets();
+  result.thinned_vertices = loaded.scene->thinned_vertices();
   result.warnings = std::move(warnings);
   return result;
 }
@@ -481,6 +486,7 @@ Json picture_report(const PictureResult& picture) {
   report["failed_shell_walks"] = picture.failed_shell_walks;
   report["flipped_tetrahedra"] = picture.flipped_tetrahedra;
   report["degenerate_tetrahedra"] = picture.degenerate_tetrahedra;
+  report["thinned_shell_vertices"] = picture.thinned_vertices;
   report["warnings"] = warnings_report(picture.warnings);
   return report;
 }

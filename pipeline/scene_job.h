@@ -84,6 +84,7 @@ struct PictureResult {
   std::uint64_t failed_shell_walks = 0;
   std::uint32_t flipped_tetrahedra = 0;
   std::uint32_t degenerate_tetrahedra = 0;
+  std::uint32_t thinned_vertices = 0;
   std::vector<Warning> warnings;
 };
 

@@ -29,6 +29,30 @@ std::string weights_text(const MicrocylinderFabric& fabric, const InteractiveSet
       .dump();
 }
 
+nlohmann::json list(const Vec3d& v) {
+  return {v.x(), v.y(), v.z()};
+}
+
+/// What moves a shape; nothing where nothing does.
+nlohmann::json placement_text(const Placement& placement) {
+  if (placement.is_identity()) return {};
+  return {placement.scale, list(placement.rotate), list(placement.translate_mm)};
+}
+
+nlohmann::json mesh_text(const MeshFile& mesh) {
+  nlohmann::json text = {content_hash_of_file(mesh.path), mesh.mm_per_unit};
+  // Only what is asked for: older scenes keep their keys.
+  if (!mesh.group.empty()) text.push_back({{"group", mesh.group}});
+  if (mesh.is_smooth()) {
+    text.push_back({{"subdivide", mesh.subdivide},
+                    {"px", mesh.subdivide_px.value_or(0)},
+                    {"sharp_corners", mesh.sharp_corners},
+                    {"near_vertices", mesh.near_vertices}});
+  }
+  if (!mesh.placement.is_identity()) text.push_back(placement_text(mesh.placement));
+  return text;
+}
+
 /// The shapes of everything in a scene.
 std::string geometry_text(const SceneConfig& config,
                           const std::function<std::string(const fs::path&)>& geometry_key) {
@@ -36,10 +60,13 @@ std::string geometry_text(const SceneConfig& config,
   for (const ClothConfig& cloth : config.cloths) {
     nlohmann::json shape = {{"underlay", cloth.underlay}};
     if (cloth.mesh) {
-      shape["mesh"] = {content_hash_of_file(cloth.mesh->path), cloth.mesh->mm_per_unit};
+      shape["mesh"] = mesh_text(*cloth.mesh);
     } else {
       shape["flat_mm"] = {cloth.flat_width_mm, cloth.flat_height_mm};
+      if (!cloth.flat_placement.is_identity())
+        shape["placement"] = placement_text(cloth.flat_placement);
     }
+    if (cloth.thickness != 1) shape["thickness"] = cloth.thickness;
     if (!cloth.surface) shape["fibers"] = geometry_key(cloth.fabric);
     if (cloth.pattern) {
       for (const fs::path& file : cloth.pattern->fabrics)
@@ -52,9 +79,17 @@ std::string geometry_text(const SceneConfig& config,
     cloths.push_back(shape);
   }
   nlohmann::json meshes = nlohmann::json::array();
-  for (const MeshFile& mesh : config.meshes)
-    meshes.push_back({content_hash_of_file(mesh.path), mesh.mm_per_unit});
-  return nlohmann::json{{"cloths", cloths}, {"meshes", meshes}}.dump();
+  for (const MeshFile& mesh : config.meshes) meshes.push_back(mesh_text(mesh));
+  nlohmann::json text = {{"cloths", cloths}, {"meshes", meshes}};
+  if (is_cut_for_pictures(config)) {
+    for (const ViewConfig& view : config.views) {
+      const CameraConfig& camera = view.camera;
+      text["views"].push_back({list(camera.position), list(camera.look_at), list(camera.up),
+                               camera.fov, camera.fov_axis == FovAxis::kHorizontal, camera.width,
+                               camera.height});
+    }
+  }
+  return text.dump();
 }
 
 Stage maps_stage(const std::string& geometry, std::size_t cloth, ClothSide side) {

@@ -25,6 +25,15 @@ EyeRay Camera::ray(double x, double y) const {
   return {position_, direction.cast<float>(), pixel_size(direction.dot(forward_))};
 }
 
+bool Camera::may_see(const Vec3d& middle, double radius) const {
+  const Vec3d offset = middle - position_;
+  const double z = offset.dot(forward_);
+  const auto reaches = [&](const Vec3d& axis, double tangent) {
+    return std::abs(offset.dot(axis)) - z * tangent <= radius * std::hypot(1.0, tangent);
+  };
+  return z >= -radius && reaches(right_, tan_x_) && reaches(up_, tan_y_);
+}
+
 std::string Camera::world_to_camera_text() const {
   std::string text;
   for (const Vec3d& axis : {right_, up_, Vec3d(-forward_)}) {

@@ -50,6 +50,9 @@ class Camera {
   double depth(const Vec3d& position) const { return forward_.dot(position - position_); }
   /// Edge of one pixel's footprint (mm) at that depth.
   double pixel_size(double depth) const { return 2.0 * tan_x_ * depth / width_; }
+  double distance(const Vec3d& position) const { return (position - position_).norm(); }
+  /// Could a part of that ball lie in the picture? Never false where it does.
+  bool may_see(const Vec3d& middle, double radius) const;
   /// Row-major 4 x 4 matrix (x right, y up, z backward) as 16 numbers separated by spaces.
   std::string world_to_camera_text() const;
 

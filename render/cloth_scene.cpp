@@ -23,25 +23,11 @@ double thickness(const ClothTiling& tiling) {
   return static_cast<double>(tiling.z_max()) - static_cast<double>(tiling.z_min());
 }
 
-Shell make_shell(const ClothMesh& mesh, const ClothTiling& tiling) {
+Shell make_shell(const ClothPiece& piece) {
+  const ClothTiling& tiling = piece.tiling;
   const double margin = kShellMargin * thickness(tiling);
-  return Shell(mesh, static_cast<double>(tiling.z_min()) - margin,
-               static_cast<double>(tiling.z_max()) + margin);
-}
-
-ClothMesh read_cloth_mesh(const MeshFile& file, double uv_size_mm) {
-  const ObjMesh obj = read_obj(file.path, {file.mm_per_unit, uv_size_mm});
-  return cloth_mesh_of(obj, file.path.string(), file.mm_per_unit, uv_size_mm);
-}
-
-TriangleMesh read_black_mesh(const MeshFile& file) {
-  const ObjMesh obj = read_obj(file.path, {.mm_per_unit = file.mm_per_unit});
-  TriangleMesh mesh;
-  for (const std::array<float, 3>& p : obj.positions) {
-    mesh.positions.push_back((file.mm_per_unit * Vec3d(p[0], p[1], p[2])).cast<float>());
-  }
-  mesh.triangles = obj.triangles;
-  return mesh;
+  return Shell(piece.mesh, static_cast<double>(tiling.z_min()) - margin,
+               static_cast<double>(tiling.z_max()) + margin, piece.shell);
 }
 
 /// Squared distance of a point to a triangle: to its plane, or to the nearest edge.
@@ -88,9 +74,10 @@ ClothScene::ClothScene(std::vector<ClothPiece> pieces, std::vector<TriangleMesh>
             if (is_new) materials_.insert(materials_.end(), scattering.begin(), scattering.end());
             parts_.push_back({static_cast<std::uint32_t>(cloths.size()), tile, place->second});
           }
-          Shell shell = make_shell(piece.mesh, piece.tiling);
+          Shell shell = make_shell(piece);
           if (piece.underlay)
-            black_meshes.push_back(shell.underside_mesh(kUnderlayGap * thickness(piece.tiling)));
+            black_meshes.push_back(shell.underside_mesh(kUnderlayGap * piece.shell.thickness *
+                                                        thickness(piece.tiling)));
           std::optional<YarnTints> tints;
           if (piece.yarn_tint) tints.emplace(piece.tiling, *piece.yarn_tint);
           cloths.push_back(
@@ -197,22 +184,37 @@ std::uint32_t ClothScene::degenerate_tets() const {
   return count;
 }
 
+std::uint32_t ClothScene::thinned_vertices() const {
+  std::uint32_t count = 0;
+  for (const Cloth& cloth : cloths_) count += cloth.shell.thinned_count();
+  return count;
+}
+
 ClothScene make_cloth_scene(const SceneConfig& config, std::span<const ClothTiling> tilings) {
+  std::vector<Camera> cameras;
+  for (const ViewConfig& view : config.views) cameras.emplace_back(view.camera);
   std::vector<ClothPiece> pieces;
   std::vector<SurfaceCloth> surfaces;
   for (const ClothConfig& cloth : config.cloths) {
-    ClothMesh mesh = cloth.mesh
-                         ? read_cloth_mesh(*cloth.mesh, cloth.uv_size_mm)
-                         : flat_cloth(cloth.flat_width_mm, cloth.flat_height_mm, flat_cells(cloth));
+    ClothMesh mesh =
+        cloth.mesh
+            ? read_cloth_mesh(*cloth.mesh, cloth.uv_size_mm, cloth.on_uvs, cameras)
+            : placed(flat_cloth(cloth.flat_width_mm, cloth.flat_height_mm, flat_cells(cloth)),
+                     cloth.flat_placement);
     if (cloth.surface) {
       surfaces.emplace_back(cloth.surface->model, std::move(mesh));
     } else {
       if (cloth.yarn_drift) mesh = with_yarn_drift(std::move(mesh), *cloth.yarn_drift);
-      pieces.push_back({tilings[pieces.size()], std::move(mesh), cloth.underlay, cloth.yarn_tint});
+      const bool is_smooth = cloth.mesh && cloth.mesh->is_smooth();
+      pieces.push_back({tilings[pieces.size()],
+                        std::move(mesh),
+                        cloth.underlay,
+                        cloth.yarn_tint,
+                        {.thickness = cloth.thickness, .thin_tight_folds = is_smooth}});
     }
   }
   std::vector<TriangleMesh> black;
-  for (const MeshFile& mesh : config.meshes) black.push_back(read_black_mesh(mesh));
+  for (const MeshFile& mesh : config.meshes) black.push_back(read_black_mesh(mesh, cameras));
   return {std::move(pieces), std::move(black), std::move(surfaces)};
 }
 

@@ -39,6 +39,7 @@ struct ClothPiece {
   ClothMesh mesh;
   bool underlay = false;  // a black copy of the underside lies below
   std::optional<YarnTintConfig> yarn_tint = {};
+  Shell::Options shell = {};
 };
 
 /// A point on a fiber, seen through a shell.
@@ -177,6 +178,7 @@ class ClothScene {
   std::uint64_t failed_walks() const { return failed_walks_.load(std::memory_order_relaxed); }
   std::uint32_t flipped_tets() const;
   std::uint32_t degenerate_tets() const;
+  std::uint32_t thinned_vertices() const;
 
  private:
   struct Cloth {

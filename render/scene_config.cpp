@@ -106,12 +106,40 @@ std::string read_view_name(const TomlTable& table, const SceneConfig& scene) {
   return name;
 }
 
+Placement read_placement(const TomlTable& table) {
+  constexpr std::array<double, 3> kNone = {0, 0, 0};
+  Placement placement;
+  placement.scale = table.number("scale", {0, 1000, true}, 1.0);
+  placement.rotate = vector_of(table.number3("rotate_deg", {-360, 360}, kNone)) * radians(1);
+  placement.translate_mm = vector_of(table.number3("translate_mm", kAnyLength, kNone));
+  return placement;
+}
+
 MeshFile read_mesh(const TomlTable& table) {
   MeshFile mesh;
   mesh.path = table.existing_file("mesh");
   const std::string unit = table.choice("mesh_unit", {"m", "cm", "mm"});
   mesh.mm_per_unit = unit == "m" ? 1000.0 : (unit == "cm" ? 10.0 : 1.0);
+  if (table.has("group")) mesh.group = table.string("group");
+  mesh.subdivide = static_cast<int>(table.integer("subdivide", 0, 8, 0));
+  mesh.subdivide_px = table.optional_number("subdivide_px", {0.1, 1e4});
+  if (mesh.subdivide > 0 && mesh.subdivide_px)
+    table.fail("subdivide_px", "expected only one of subdivide and subdivide_px");
+  mesh.sharp_corners = table.choice("subdivide_corners", {"sharp", "round"}, "sharp") == "sharp";
+  mesh.near_vertices = table.choice("subdivide_vertices", {"cage", "near"}, "cage") == "near";
+  mesh.placement = read_placement(table);
+  mesh.table = table;
   return mesh;
+}
+
+FabricPlacement read_fabric_placement(const TomlTable& table) {
+  FabricPlacement fabric;
+  const std::array<double, 2> tiling = table.number2("uv_tiling", {0.001, 1000}, {{1, 1}});
+  fabric.tiling = {tiling[0], tiling[1]};
+  fabric.turn = radians(table.number("uv_turn_deg", {-360, 360}, 0.0));
+  const std::array<double, 2> offset = table.number2("uv_offset_mm", {-1e5, 1e5}, {{0, 0}});
+  fabric.offset_mm = {offset[0], offset[1]};
+  return fabric;
 }
 
 /// A preset's name, or a file that ends in .toml, relative to the scene's folder.
@@ -259,6 +287,7 @@ void read_fibers(const TomlTable& table, ClothConfig& cloth) {
   if (const std::optional<TomlTable> tint = table.optional_table("yarn_tint"))
     cloth.yarn_tint = read_yarn_tint(*tint);
   cloth.underlay = table.boolean("underlay", false);
+  cloth.thickness = table.number("thickness", {0.01, 100}, 1.0);
 }
 
 ClothConfig read_cloth(const TomlTable& table) {
@@ -268,7 +297,9 @@ ClothConfig read_cloth(const TomlTable& table) {
   if (table.has("mesh")) {
     cloth.mesh = read_mesh(table);
     cloth.uv_size_mm = table.number("uv_size_mm", kSize);
+    cloth.on_uvs = read_fabric_placement(table);
   } else {
+    cloth.flat_placement = read_placement(table);
     const std::array<double, 2> size = table.number2("flat_mm", kSize);
     cloth.flat_width_mm = size[0];
     cloth.flat_height_mm = size[1];
@@ -291,6 +322,13 @@ std::vector<std::filesystem::path> fabric_files(const ClothConfig& cloth) {
   if (cloth.surface) return {};
   if (cloth.pattern) return cloth.pattern->fabrics;
   return {cloth.fabric};
+}
+
+bool is_cut_for_pictures(const SceneConfig& scene) {
+  const auto is_cut = [](const MeshFile& mesh) { return mesh.subdivide_px.has_value(); };
+  return std::any_of(scene.cloths.begin(), scene.cloths.end(),
+                     [&](const ClothConfig& cloth) { return cloth.mesh && is_cut(*cloth.mesh); }) ||
+         std::any_of(scene.meshes.begin(), scene.meshes.end(), is_cut);
 }
 
 SceneConfig read_scene_config(const TomlTable& document) {

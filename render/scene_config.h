@@ -17,6 +17,7 @@
 #include "formats/toml_table.h"
 #include "render/camera.h"
 #include "render/lights.h"
+#include "render/mesh_file.h"
 #include "render/methods.h"
 #include "render/surface/microcylinder.h"
 #include "render/surface/surface_model.h"
@@ -29,11 +30,6 @@ namespace heddle {
 enum class SurfaceMethod : std::uint8_t {
   kSampled,      // shadow rays and directions drawn from the model
   kInteractive,  // closed forms from precomputed data (surface/interactive_microcylinder.h)
-};
-
-struct MeshFile {
-  std::filesystem::path path;
-  double mm_per_unit = 1;
 };
 
 /// A cloth without fibers.
@@ -73,9 +69,11 @@ struct PatternConfig {
 struct ClothConfig {
   std::optional<MeshFile> mesh;  // an OBJ with UVs, or else a flat swatch
   double uv_size_mm = 0;         // flat cloth (mm) per unit of UV; meshes only
+  FabricPlacement on_uvs;        // meshes only
   // flat swatch centred on the world's origin, z = 0; x = weft, y = warp
   double flat_width_mm = 0;
   double flat_height_mm = 0;
+  Placement flat_placement;
   // fabric TOML; empty where a surface model draws the cloth; the first of a pattern
   std::filesystem::path fabric;
   std::optional<PatternConfig> pattern;       // in place of one fabric
@@ -87,6 +85,7 @@ struct ClothConfig {
   // fibers only: what a plan may draw instead where it is good enough
   std::optional<SurfaceFabric> far_surface;
   bool underlay = false;  // a black copy of the cloth's underside just below it; fibers only
+  double thickness = 1;   // relative to the fabric's; fibers only
 };
 
 /// The fabric files of a cloth: none for a surface, one, or those of its pattern.
@@ -120,6 +119,9 @@ struct SceneConfig {
   // smoothing of global visibility; from the fabric where absent
   std::optional<double> shadow_sigma_mm;
 };
+
+/// Do shapes depend on the cameras (subdivide_px)?
+bool is_cut_for_pictures(const SceneConfig& scene);
 
 /// Reads a whole scene document, finish() included.
 SceneConfig read_scene_config(const TomlTable& document);

@@ -1,6 +1,7 @@
 #include "render/shell.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 
@@ -31,10 +32,14 @@ bool is_degenerate(const Mat3d& edges) {
 
 }  // namespace
 
-ClothMesh cloth_mesh_of(const ObjMesh& obj, const std::string& name, double mm_per_unit,
-                        double uv_size_mm) {
+void require_uvs(const ObjMesh& obj, const std::string& name) {
   if (obj.triangles.empty()) throw FileError(name + ": the mesh has no faces");
   if (obj.uvs.empty()) throw FileError(name + ": cloth needs UVs, but the mesh has none");
+}
+
+ClothMesh cloth_mesh_of(const ObjMesh& obj, const std::string& name, double mm_per_unit,
+                        double uv_size_mm, const std::vector<std::uint8_t>& shown) {
+  require_uvs(obj, name);
   ClothMesh mesh;
   // Normals are shared by all vertices at one position, so that the shell has no cracks at UV
   // seams.
@@ -56,12 +61,13 @@ ClothMesh cloth_mesh_of(const ObjMesh& obj, const std::string& name, double mm_p
     Vec3d& normal = normal_at.try_emplace(p, Vec3d::Zero()).first->second;
     if (!obj.normals.empty()) normal += vec3d(obj.normals[v]);
   }
-  for (const std::array<std::uint32_t, 3>& t : obj.triangles) {
+  for (std::size_t k = 0; k < obj.triangles.size(); ++k) {
+    const std::array<std::uint32_t, 3>& t = obj.triangles[k];
     const std::array<std::uint32_t, 3> triangle = {index[t[0]], index[t[1]], index[t[2]]};
     // A triangle that welding folded into an edge covers nothing.
     if (triangle[0] == triangle[1] || triangle[1] == triangle[2] || triangle[2] == triangle[0])
       continue;
-    mesh.triangles.push_back(triangle);
+    if (shown.empty() || shown[k] != 0) mesh.triangles.push_back(triangle);
     if (!obj.normals.empty()) continue;
     const Vec3d& a = mesh.positions[triangle[0]];
     const Vec3d doubled_area =
@@ -72,7 +78,28 @@ ClothMesh cloth_mesh_of(const ObjMesh& obj, const std::string& name, double mm_p
     const Vec3d& normal = normal_at[p];
     mesh.normals.push_back(normal.norm() > 0 ? Vec3d(normal.normalized()) : Vec3d(0, 0, 1));
   }
-  return mesh;
+  if (shown.empty()) return mesh;
+  return without_unused_vertices(std::move(mesh));
+}
+
+ClothMesh without_unused_vertices(ClothMesh mesh) {
+  ClothMesh result;
+  std::vector<std::uint32_t> index(mesh.positions.size(), Shell::kNone);
+  for (const std::array<std::uint32_t, 3>& triangle : mesh.triangles) {
+    for (const std::uint32_t v : triangle) index[v] = 0;
+  }
+  for (std::size_t v = 0; v < index.size(); ++v) {
+    if (index[v] == Shell::kNone) continue;
+    index[v] = static_cast<std::uint32_t>(result.positions.size());
+    result.positions.push_back(mesh.positions[v]);
+    result.normals.push_back(mesh.normals[v]);
+    result.fabric.push_back(mesh.fabric[v]);
+  }
+  for (std::array<std::uint32_t, 3>& triangle : mesh.triangles) {
+    for (std::uint32_t& v : triangle) v = index[v];
+  }
+  result.triangles = std::move(mesh.triangles);
+  return result;
 }
 
 ClothMesh flat_cloth(double width_mm, double height_mm, std::uint32_t cells) {
@@ -94,15 +121,16 @@ ClothMesh flat_cloth(double width_mm, double height_mm, std::uint32_t cells) {
   return mesh;
 }
 
-Shell::Shell(const ClothMesh& mesh, double z_min, double z_max)
+Shell::Shell(const ClothMesh& mesh, double z_min, double z_max, const Options& options)
     : normals_(mesh.normals), triangles_(mesh.triangles), z_min_(z_min), z_max_(z_max) {
   for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
     for (const double z : {z_min, z_max}) {
-      world_.push_back(mesh.positions[v] + z * mesh.normals[v]);
+      world_.push_back(mesh.positions[v] + options.thickness * z * mesh.normals[v]);
       fabric_.emplace_back(mesh.fabric[v].x(), mesh.fabric[v].y(), z);
     }
   }
   cut_prisms();
+  if (options.thin_tight_folds) thin_tight_folds(mesh, options.thickness);
   map_tets();
   connect_tets();
   connect_triangles();
@@ -135,6 +163,51 @@ void Shell::cut_prisms() {
   if (volume < 0) {
     for (Tet& tet : tets_) std::swap(tet.vertex[2], tet.vertex[3]);
   }
+}
+
+void Shell::thin_tight_folds(const ClothMesh& mesh, double thickness) {
+  constexpr int kRounds = 60;
+  constexpr double kThinner = 0.85;  // in each round
+  const auto is_flipped = [&](const Tet& tet) {
+    return edges(world_, tet.vertex).determinant() < 0;
+  };
+  if (std::none_of(tets_.begin(), tets_.end(), is_flipped)) return;
+  // Vertices on both sides of a UV seam stay together: [surface vertex] the first at its place.
+  std::vector<std::uint32_t> first(mesh.positions.size());
+  std::map<std::array<double, 3>, std::uint32_t> first_at;
+  for (std::uint32_t v = 0; v < first.size(); ++v) {
+    const Vec3d& p = mesh.positions[v];
+    first[v] = first_at.try_emplace({p.x(), p.y(), p.z()}, v).first->second;
+  }
+  std::vector<double> share(2 * first.size(), 1);  // [vertex of the shell]
+  for (int round = 0; round < kRounds; ++round) {
+    std::vector<std::uint8_t> is_too_thick(share.size(), 0);
+    bool any = false;
+    for (std::uint32_t tet = 0; tet < tets_.size(); ++tet) {
+      if (!is_flipped(tets_[tet])) continue;
+      any = true;
+      const std::array<std::uint32_t, 3>& t = triangles_[tet / 3];
+      const Vec3d middle = (mesh.positions[t[1]] - mesh.positions[t[0]])
+                               .cross(mesh.positions[t[2]] - mesh.positions[t[0]]);
+      std::array<double, 2> left_over;  // of the triangle's area on each side
+      for (std::uint32_t side = 0; side < 2; ++side) {
+        const Vec3d& corner = world_[2 * t[0] + side];
+        left_over[side] =
+            middle.dot((world_[2 * t[1] + side] - corner).cross(world_[2 * t[2] + side] - corner));
+      }
+      const std::uint32_t inner = left_over[0] < left_over[1] ? 0 : 1;
+      for (const std::uint32_t v : t) is_too_thick[2 * first[v] + inner] = 1;
+    }
+    if (!any) break;
+    for (std::uint32_t v = 0; v < share.size(); ++v) {
+      if (is_too_thick[2 * first[v / 2] + v % 2] == 0) continue;
+      share[v] *= kThinner;
+      const double z = v % 2 == 0 ? z_min_ : z_max_;
+      world_[v] = mesh.positions[v / 2] + share[v] * thickness * z * mesh.normals[v / 2];
+    }
+  }
+  thinned_count_ = static_cast<std::uint32_t>(
+      std::count_if(share.begin(), share.end(), [](double s) { return s < 1; }));
 }
 
 void Shell::map_tets() {
@@ -190,21 +263,32 @@ void Shell::connect_tets() {
 }
 
 void Shell::connect_triangles() {
-  std::map<std::pair<std::uint32_t, std::uint32_t>,
-           std::vector<std::pair<std::uint32_t, std::size_t>>>
-      edge_sides;
+  struct Side {
+    std::array<std::uint32_t, 2> edge;
+    std::uint32_t triangle;
+    std::uint32_t corner;  // opposite the edge
+  };
+  std::vector<Side> sides;
   triangle_neighbours_.assign(triangles_.size(), {kNone, kNone, kNone});
   for (std::uint32_t t = 0; t < triangles_.size(); ++t) {
-    for (std::size_t corner = 0; corner < 3; ++corner) {
-      const std::uint32_t i = triangles_[t][(corner + 1) % 3];
-      const std::uint32_t j = triangles_[t][(corner + 2) % 3];
-      edge_sides[std::minmax(i, j)].emplace_back(t, corner);
+    for (std::uint32_t corner = 0; corner < 3; ++corner) {
+      const auto [low, high] =
+          std::minmax({triangles_[t][(corner + 1) % 3], triangles_[t][(corner + 2) % 3]});
+      sides.push_back({{low, high}, t, corner});
     }
   }
-  for (const auto& [edge, sides] : edge_sides) {
-    if (sides.size() != 2) continue;
-    triangle_neighbours_[sides[0].first][sides[0].second] = sides[1].first;
-    triangle_neighbours_[sides[1].first][sides[1].second] = sides[0].first;
+  std::sort(sides.begin(), sides.end(),
+            [](const Side& a, const Side& b) { return a.edge < b.edge; });
+  for (std::size_t first = 0; first < sides.size();) {
+    std::size_t last = first + 1;
+    while (last < sides.size() && sides[last].edge == sides[first].edge) ++last;
+    if (last - first == 2) {
+      const Side& a = sides[first];
+      const Side& b = sides[first + 1];
+      triangle_neighbours_[a.triangle][a.corner] = b.triangle;
+      triangle_neighbours_[b.triangle][b.corner] = a.triangle;
+    }
+    first = last;
   }
 }
 

@@ -40,9 +40,16 @@ struct ClothMesh {
 
 /// Vertices with equal position and UV become one; at a UV seam they stay apart (an open rim) and
 /// share their normal. Normals are the file's, averaged per position, or area-weighted face normals
-/// where the file has none. Errors: FileError naming `name` (no UVs, no triangles).
+/// where the file has none. `shown`: [triangle] of those that become cloth, all where it is empty;
+/// normals are those of the whole. Errors: FileError naming `name` (no UVs, no triangles).
 ClothMesh cloth_mesh_of(const ObjMesh& obj, const std::string& name, double mm_per_unit,
-                        double uv_size_mm);
+                        double uv_size_mm, const std::vector<std::uint8_t>& shown = {});
+
+/// Errors: FileError naming `name` where the mesh has no faces or no UVs.
+void require_uvs(const ObjMesh& obj, const std::string& name);
+
+/// The mesh without the vertices that no triangle has.
+ClothMesh without_unused_vertices(ClothMesh mesh);
 
 /// A flat swatch centred on the origin in which fabric space is world space, of cells * cells
 /// rectangles.
@@ -67,7 +74,14 @@ class Shell {
         neighbour;  // across the face opposite each vertex: 4 * tet + that face there, or kNone
   };
 
-  Shell(const ClothMesh& mesh, double z_min, double z_max);
+  struct Options {
+    double thickness = 1;  // of the shell in the world, relative to the fabric's
+    // Where a fold is tighter than the cloth is thick, its inner side is drawn towards the surface
+    // until no tetrahedron is flipped.
+    bool thin_tight_folds = false;
+  };
+  Shell(const ClothMesh& mesh, double z_min, double z_max, const Options& options);
+  Shell(const ClothMesh& mesh, double z_min, double z_max) : Shell(mesh, z_min, z_max, {}) {}
 
   const std::vector<Tet>& tets() const { return tets_; }
   std::size_t triangle_count() const { return tets_.size() / 3; }
@@ -80,6 +94,8 @@ class Shell {
   /// either space.
   std::uint32_t flipped_count() const { return flipped_count_; }
   std::uint32_t degenerate_count() const { return degenerate_count_; }
+  /// Vertices of either side that were drawn towards the surface.
+  std::uint32_t thinned_count() const { return thinned_count_; }
 
   /// Outer faces (top, bottom, rims): [face] 4 * tet + face, in the order of boundary_mesh()'s
   /// triangles.
@@ -158,9 +174,10 @@ class Shell {
     Vec3d fabric;
   };
 
-  // The constructor's steps: three tetrahedra for each triangle; their maps; what lies behind their
-  // faces; what lies behind the edges of the triangles.
+  // The constructor's steps: three tetrahedra for each triangle; none of them flipped; their maps;
+  // what lies behind their faces; what lies behind the edges of the triangles.
   void cut_prisms();
+  void thin_tight_folds(const ClothMesh& mesh, double thickness);
   void map_tets();
   void connect_tets();
   void connect_triangles();
@@ -204,6 +221,7 @@ class Shell {
   double z_max_;
   std::uint32_t flipped_count_ = 0;
   std::uint32_t degenerate_count_ = 0;
+  std::uint32_t thinned_count_ = 0;
 };
 
 inline Shell::Crossed Shell::cross(const std::array<Seen, 3>& c) const {

@@ -1,6 +1,8 @@
 #include "formats/obj_mesh.h"
 
 #include <cmath>
+#include <map>
+#include <string>
 
 #include "tests/formats/file_fixture.h"
 #include "tests/support/mutations.h"
@@ -67,6 +69,51 @@ TEST_F(ObjMeshFormat, OtherLinesAreIgnored) {
            std::string(kThree) +
            "vw 99999999999999999999 1\nvp 0 0\nl 1 2\nunknown nonsense\n\nf 1 2 3\n");
   EXPECT_EQ(mesh.triangles.size(), 1u);
+}
+
+TEST_F(ObjMeshFormat, FacesKeepTheirCornersAndGroups) {
+  const ObjMesh mesh = read(
+      std::string(kThree) +
+      "v 1 1 0\nf 1 2 3\no left shirt \ng a b\nf 1 2 4 3\ng\nf 1 2 4\ng b a\nf 2 4 3\ng a b\nf 3 "
+      "4 1\n");
+  EXPECT_EQ(mesh.face_corners, (std::vector<std::uint32_t>{3, 4, 3, 3, 3}));
+  EXPECT_EQ(mesh.face_part, (std::vector<std::uint32_t>{0, 1, 2, 3, 1}));
+  EXPECT_EQ(mesh.parts,
+            (std::vector<std::vector<std::string>>{
+                {}, {"a", "b", "left shirt"}, {"left shirt"}, {"b", "a", "left shirt"}}));
+  EXPECT_EQ(group_names(mesh), (std::vector<std::string>{"a", "b", "left shirt"}));
+  // Triangles: 1, the quad's 2, and 3 more.
+  EXPECT_EQ(triangles_of_group(mesh, "a"), (std::vector<std::uint8_t>{0, 1, 1, 0, 1, 1}));
+  EXPECT_EQ(triangles_of_group(mesh, "left shirt"), (std::vector<std::uint8_t>{0, 1, 1, 1, 1, 1}));
+  EXPECT_EQ(triangles_of_group(mesh, "left"), std::vector<std::uint8_t>(6, 0));
+}
+
+TEST_F(ObjMeshFormat, SharpEdgesAndVerticesAreTags) {
+  const ObjMesh mesh =
+      read(std::string(kThree) +
+           "f 1 2 3\nt crease 4/2/0 0 1 1 2 2.5 99\nt crease 2/1/0 0 2 1\nt corner "
+           "2/1/0 0 2 3\nt interpolateboundary 1/0/0 2\nt\n");
+  ASSERT_EQ(mesh.sharp_edges.size(), 3U);
+  EXPECT_EQ(mesh.sharp_edges[0].ends[1], (std::array<float, 3>{1, 0, 0}));
+  EXPECT_EQ(mesh.sharp_edges[0].sharpness, 2.5F);
+  EXPECT_EQ(mesh.sharp_edges[1].sharpness, 10) << "the sharpest there is";
+  EXPECT_EQ(mesh.sharp_edges[2].line, 6U);
+  ASSERT_EQ(mesh.sharp_vertices.size(), 2U);
+  EXPECT_EQ(mesh.sharp_vertices[1].place, (std::array<float, 3>{0, 1, 0}));
+  for (const auto& [tag, reason] : std::map<std::string, std::string>{
+           {"crease 2/1/0 0 3 1", "m.obj:4: tag crease: vertex 3 of 3, from 0"},
+           {"crease 3/1/0 0 1 2 1", "pairs of vertices"},
+           {"crease 4/3/0 0 1 1 2 1 1 1", "one sharpness or one for each"},
+           {"crease 2/0/0 0 1", "one sharpness"},
+           {"crease 2/1/0 0 1 -1", "below 0"},
+           {"crease 2/1/0 0 1 nan", "finite"},
+           {"crease 2/1/0 0", "'' is no whole number"},
+           {"crease 2/1 0 1 1", "'' is no whole number"},
+           {"crease 99999999999999999999/1/0 0 1 1", "is no whole number"},
+           {"crease 9999999999/1/0 0 1 1", "is no whole number"},
+           {"corner -1/1/0 0 1 1", "'-1' is no whole number"}}) {
+    expect_refused(std::string(kThree) + "t " + tag + "\nf 1 2 3\n", reason);
+  }
 }
 
 TEST_F(ObjMeshFormat, IndicesOutsideTheFileAreRefused) {
@@ -166,8 +213,9 @@ TEST_F(ObjMeshFormat, CoordinatesBeyondAKilometreAreRefusedWithVertexAndLine) {
 
 TEST_F(ObjMeshFormat, DamagedFilesEndInAMeshOrAnError) {
   const std::string text =
-      "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\nf 1/1/1 2/1/1 3/1/1 4/1/1\nf -1 -2 "
-      "-3\n";
+      "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\ng a\nf 1/1/1 2/1/1 3/1/1 4/1/1\nf -1 "
+      "-2 "
+      "-3\nt crease 2/1/0 0 1 2\n";
   for_each_mutation(text, 1, std::string_view("\0\n /-9e#\xff", 9),
                     [&](const std::string& damaged) {
                       try {

@@ -253,7 +253,9 @@ TEST(ConfigDocumentation, NamesEveryKeyOfAScene) {
   }
   // What no scene of ours holds.
   const std::string more =
-      "[[mesh]]\nmesh = \"../meshes/drape_sphere_64.obj\"\nmesh_unit = \"m\"\n"
+      "[[mesh]]\nmesh = \"../meshes/drape_sphere_64.obj\"\nmesh_unit = \"m\"\ngroup = \"cloth\"\n"
+      "[[cloth]]\nmesh = \"../meshes/drape_sphere_64.obj\"\nmesh_unit = \"m\"\ngroup = "
+      "\"cloth\"\nuv_size_mm = 300\nfabric = \"../fabrics/cotton-tiny.toml\"\n"
       "[[cloth]]\nflat_mm = [1, 1]\nfabric = \"../fabrics/cotton-tiny.toml\"\nfar_surface = "
       "\"silk-shot\"\n"
       "[[light]]\ntype = \"sphere\"\nposition_mm = [0, 0, 9]\nradius_mm = 1\nradiance = [1, 1, 1]\n"

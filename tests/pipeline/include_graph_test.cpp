@@ -43,6 +43,7 @@ const std::vector<std::pair<std::string, std::string>> kNotWithinPipeline = {
 /// Third-party headers and the files (regular expression) that may include them.
 const std::vector<std::pair<std::string, std::string>> kConfined = {
     {R"(embree3?/.*)", R"((fibers|render)/.*\.cpp)"},
+    {R"(opensubdiv/.*)", R"(render/limit_surface\.cpp)"},
     {R"(openvdb/.*)", R"(formats/id_volume_file\.cpp)"},
     {R"((OpenEXR/|Imath/|Imf|Imath|Iex|half\.h).*)", R"(formats/image_file\.cpp)"},
     {R"(png\.h)", R"(formats/image_file\.cpp)"},

@@ -69,5 +69,26 @@ TEST(Camera, WorldToCameraTextMapsTheTargetOntoTheAxis) {
   EXPECT_NEAR(seen.z(), -(config.look_at - config.position).norm(), 1e-6);
 }
 
+TEST(Camera, SeesBallsThatReachIntoThePicture) {
+  const Camera camera(oblique());
+  for (const double x : {0.0, 60.0, 200.0}) {
+    for (const double y : {0.0, 100.0}) {
+      const EyeRay ray = camera.ray(x, y);
+      const Vec3d point = ray.origin + 70 * ray.direction.cast<double>();
+      EXPECT_TRUE(camera.may_see(point, 0.01));
+      EXPECT_NEAR(camera.distance(point), 70, 1e-4);
+    }
+  }
+  // A ball beside the picture is seen once it reaches in.
+  const EyeRay aside = camera.ray(-100, 50);
+  const Vec3d point = aside.origin + 70 * aside.direction.cast<double>();
+  const double gap = 70 * std::sin(angle(aside, camera.ray(0, 50)));
+  EXPECT_FALSE(camera.may_see(point, 0.98 * gap));
+  EXPECT_TRUE(camera.may_see(point, 1.02 * gap));
+  const Vec3d behind = aside.origin - 10 * camera.ray(100, 50).direction.cast<double>();
+  EXPECT_FALSE(camera.may_see(behind, 9));
+  EXPECT_TRUE(camera.may_see(behind, 11));
+}
+
 }  // namespace
 }  // namespace heddle

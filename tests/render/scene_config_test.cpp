@@ -305,6 +305,55 @@ TEST_F(SceneConfigTest, ASurfaceStandsInForAFabric) {
             std::string::npos);
 }
 
+TEST_F(SceneConfigTest, MeshesAreSubdividedGroupedAndPlacedIfAsked) {
+  const SceneConfig plain = read(kScene);
+  EXPECT_FALSE(plain.cloths[0].mesh->is_smooth());
+  EXPECT_TRUE(plain.cloths[0].mesh->placement.is_identity());
+  EXPECT_TRUE(plain.cloths[0].on_uvs.is_identity());
+  EXPECT_TRUE(plain.cloths[1].flat_placement.is_identity());
+  EXPECT_EQ(plain.cloths[0].thickness, 1);
+  EXPECT_FALSE(plain.meshes[0].is_smooth());
+  EXPECT_FALSE(is_cut_for_pictures(plain));
+
+  const std::string place = "scale = 2\nrotate_deg = [90, 0, -180]\ntranslate_mm = [1, 2, 3]\n";
+  std::string text =
+      with(kScene, "uv_size_mm = 300\n",
+           "uv_size_mm = 300\ngroup = \"sleeve\"\nsubdivide = 2\nsubdivide_corners = "
+           "\"round\"\nsubdivide_vertices = \"near\"\nuv_turn_deg = 90\nuv_offset_mm = [3, "
+           "4]\nuv_tiling = [5, 6]\nthickness = "
+           "1.5\n" +
+               place);
+  text = with(text, "flat_mm = [30, 20]\n", "flat_mm = [30, 20]\n" + place);
+  text = with(text, "mesh_unit = \"cm\"\n", "mesh_unit = \"cm\"\nsubdivide_px = 4\n");
+  const SceneConfig scene = read(text);
+  const MeshFile& mesh = *scene.cloths[0].mesh;
+  EXPECT_EQ(mesh.group, "sleeve");
+  EXPECT_EQ(mesh.subdivide, 2);
+  EXPECT_FALSE(mesh.sharp_corners);
+  EXPECT_TRUE(mesh.near_vertices);
+  EXPECT_EQ(scene.cloths[0].thickness, 1.5);
+  EXPECT_NEAR(scene.cloths[0].on_uvs.turn, radians(90), 1e-12);
+  EXPECT_EQ(scene.cloths[0].on_uvs.offset_mm, Eigen::Vector2d(3, 4));
+  EXPECT_EQ(scene.cloths[0].on_uvs.tiling, Eigen::Vector2d(5, 6));
+  for (const Placement& placement : {mesh.placement, scene.cloths[1].flat_placement}) {
+    EXPECT_EQ(placement.scale, 2);
+    EXPECT_LT((placement.rotate - Vec3d(radians(90), 0, radians(-180))).norm(), 1e-12);
+    EXPECT_EQ(placement.translate_mm, Vec3d(1, 2, 3));
+  }
+  EXPECT_EQ(scene.meshes[0].subdivide_px, 4);
+  EXPECT_TRUE(is_cut_for_pictures(scene));
+  EXPECT_NE(message(with(text, "subdivide_px = 4", "subdivide_px = 4\nsubdivide = 1"))
+                .find("only one of subdivide and subdivide_px"),
+            std::string::npos);
+  EXPECT_NE(message(with(text, "subdivide = 2", "subdivide = 9")).find("scene.toml:23:"),
+            std::string::npos);
+  EXPECT_NE(message(with(text, "thickness = 1.5", "thickness = 0")).find("thickness"),
+            std::string::npos);
+  EXPECT_NE(message(with(kScene, "flat_mm = [30, 20]\n", "flat_mm = [30, 20]\nuv_turn_deg = 3\n"))
+                .find("uv_turn_deg"),
+            std::string::npos);
+}
+
 TEST_F(SceneConfigTest, ASceneNeedsLightAndCloth) {
   EXPECT_NE(
       message("name = \"a\"\n" + kScene.substr(kScene.find("[camera]"),
