@@ -13,7 +13,7 @@ const std::vector<double>& Curve::of(const std::string& name) const {
 }
 
 std::span<const NamedCurve> all_curves() {
-  static constexpr std::array<NamedCurve, 15> kCurves = {
+  static constexpr std::array<NamedCurve, 16> kCurves = {
       {{"gamma", gamma_curve},
        {"visibility", visibility_curve},
        {"visibility-both", sphere_visibility_curve},
