@@ -507,11 +507,13 @@ TEST(PathTracerStatistical, BuffersAreConsistent) {
     observed += difference * difference;
   }
   // Each term of the sum is a squared normal: relative standard deviation sqrt(2) if all variances
-  // were equal; they differ, so allow twice the count's standard error times 4: 20 %.
+  // were equal; they differ, so allow twice the count's standard error times 4. The variance knows
+  // nothing of what stratified eye rays gain (0.88 here), so it is a bound from above.
   std::printf("  %d pixels: squared difference of halves %.4g, expected %.4g\n", lit, observed,
               expected);
   EXPECT_GT(lit, 3000);
-  EXPECT_NEAR(observed / expected, 1, 4 * 2 * std::sqrt(2.0 / lit));
+  EXPECT_LT(observed / expected, 1 + 4 * 2 * std::sqrt(2.0 / lit));
+  EXPECT_GT(observed / expected, 0.5);
 }
 
 TEST(PathTracer, TimedPicturesAreWholePasses) {
