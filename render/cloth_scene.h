@@ -2,8 +2,9 @@
 #define HEDDLE_RENDER_CLOTH_SCENE_H_
 // All cloth and all meshes of a scene in world space (millimetres). It traces rays through the
 // shell maps against the explicit fibers, or against whatever a query finds in fabric space. It
-// also answers macroscopic visibility against shells and meshes. Meshes are surface cloths and
-// black meshes. Fibers see both as black.
+// also answers macroscopic visibility against shells and meshes. Meshes are surface cloths,
+// coloured meshes and black ones. Fibers see them as black, except that traced paths go on from
+// coloured ones.
 //
 // Shells may overlap in space, and a ray visits all of them. Only a ray that starts inside one
 // shell does not see what another shell holds around its very origin. Fabric coordinates are folded
@@ -91,7 +92,9 @@ class ClothScene {
   ClothScene(std::vector<ClothPiece> pieces, std::vector<TriangleMesh> black_meshes,
              std::vector<SurfaceCloth> surfaces = {});
 
+  /// Surface cloths, then coloured meshes.
   std::span<const SurfaceCloth> surfaces() const { return surfaces_; }
+  bool has_solids() const { return !surfaces_.empty() && surfaces_.back().is_solid(); }
   /// Pieces of fibers; all that `cloth` counts below.
   std::size_t cloth_count() const { return cloths_.size(); }
   const Shell& shell(std::uint32_t cloth) const { return cloths_[cloth].shell; }
@@ -141,6 +144,9 @@ class ClothScene {
   /// past all shells (as solids) and meshes?
   bool globally_visible(const Shell::SurfacePoint& point, const Vec3& direction,
                         double distance = std::numeric_limits<double>::infinity()) const;
+  /// A ray that starts just above a point of a mesh.
+  static SceneRay ray_from(const Shell::SurfacePoint& point, const Vec3& direction,
+                           double distance = std::numeric_limits<double>::infinity());
   /// The same past all fibers and meshes.
   bool visible(const Shell::SurfacePoint& point, const Vec3& direction,
                double distance = std::numeric_limits<double>::infinity()) const;
