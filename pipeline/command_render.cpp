@@ -168,7 +168,9 @@ int render_frames(const RenderOptions& options, Job& job) {
     if (options.resume && is_finished_frame(exr, scene.picture_key(request))) {
       ++found;
     } else {
-      PictureResult picture = scene.render(request, fmt::format("frame {}", frame));
+      // What there is to warn of is said once; every frame's report has it.
+      const bool quiet = frame > frames.first;
+      PictureResult picture = scene.render(request, fmt::format("frame {}", frame), quiet);
       if (options.noise) say_noise(*options.noise, picture, job.console());
       picture.image.metadata["heddle.frame"] = fmt::format("{}", frame);
       // No report of another picture beside the new one, should that be all there is time for.

@@ -170,8 +170,8 @@ TEST(SequenceEndToEnd, ResumeKeepsWhatWouldComeOutTheSame) {
 TEST(SequenceEndToEnd, ASignalKeepsFinishedFrames) {
   const SequenceShop shop;
   const std::vector<std::string> frames = {"render",   "scene.toml", "-o",    "f_##.exr",
-                                           "--frames", "0-2",        "--spp", "20000"};
-  shop.succeed({"render", "scene.toml", "-o", "f_##.exr", "--frames", "0", "--spp", "20000"});
+                                           "--frames", "0-2",        "--spp", "1500"};
+  shop.succeed({"render", "scene.toml", "-o", "f_##.exr", "--frames", "0", "--spp", "1500"});
   fs::remove(shop / "f_00.json");
   Program program = shop.start(frames);
   ASSERT_TRUE(program.signal_when([&] { return fs::exists(shop / "f_00.json"); }, SIGINT));
