@@ -185,6 +185,14 @@ class ClothScene {
   Vec3 fabric_direction(const ShellHit& hit, const Vec3& direction) const {
     return (shell(hit.cloth).fabric_from_world(hit.tet) * direction).normalized();
   }
+  /// The same without the steps between tetrahedra: the frame is turned to the cloth's normal
+  /// there, which is interpolated between vertices.
+  Vec3 smooth_fabric_direction(const ShellHit& hit, const Vec3& direction) const {
+    const Vec3d normal = surface_point(hit, ClothSide::kFace).normal;
+    const Vec3d own = shell(hit.cloth).fabric_from_world(hit.tet).row(2).transpose().cast<double>();
+    const Vec3d turned = Eigen::Quaterniond::FromTwoVectors(normal, own) * direction.cast<double>();
+    return fabric_direction(hit, turned.cast<float>());
+  }
   /// Unit tangent of the hit fiber in world space.
   Vec3 world_tangent(const ShellHit& hit) const {
     return (shell(hit.cloth).world_from_fabric(hit.tet) *
