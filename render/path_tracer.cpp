@@ -37,6 +37,11 @@ PathTracer::Sample PathTracer::trace(const EyeRay& ray, RandomStream& random) co
     if (mesh->surface == nullptr) return sample;
     const SurfaceHit surface =
         mesh->surface->hit(mesh->triangle, mesh->u, mesh->v, ray.direction, ray.spread * mesh->t);
+    if (mesh->surface->is_solid() && !settings_.local) {
+      sample = radiance(ClothTrace::vertex(surface), -ray.direction, random);
+      sample.alpha = 1;
+      return sample;
+    }
     sample.single = surface_direct_light(
         surface, -ray.direction, lights_, settings_.estimator, random,
         [&](const Vec3& direction, double distance) {

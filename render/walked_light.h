@@ -15,12 +15,14 @@
 #include "fibers/tracing/path_walk.h"
 #include "render/lights.h"
 #include "render/pixel_sums.h"
+#include "render/surface_cloth.h"
 
 namespace heddle {
 
 /// Light that leaves `vertex` towards `wo`. A Trace of path_walk.h, which also answers
 /// `position(vertex)`, and `escapes(vertex, direction, distance)`: is the way clear for so many mm?
-/// A Vertex may have `is_end`: the path brings nothing from there.
+/// A Vertex may have `is_end`: the path brings nothing from there; or a `surface`, a SurfaceHit:
+/// it is no fiber.
 template <class Trace>
 EyeSample walked_light(const Trace& trace, std::span<const BcsdfTable> materials,
                        std::span<const Light> lights, LightEstimator estimator,
@@ -33,6 +35,16 @@ EyeSample walked_light(const Trace& trace, std::span<const BcsdfTable> materials
       if (at.is_end) return false;
     }
     if (estimator == LightEstimator::kEscapes) return true;
+    if constexpr (requires { at.surface; }) {
+      if (at.surface) {
+        (scattering == 1 ? sample.single : sample.multiple) +=
+            throughput * light_by_shadow_rays(*at.surface, out, lights, estimator, random,
+                                              [&](const Vec3& direction, double distance) {
+                                                return trace.escapes(at, direction, distance);
+                                              });
+        return true;
+      }
+    }
     const BcsdfTable& bcsdf = materials[at.material];
     const Vec3 local_out = frame.transpose() * out;
     for (const Light& light : lights) {
