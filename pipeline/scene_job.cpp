@@ -110,7 +110,8 @@ struct SceneJob::Loaded {
   std::vector<ClothTiling> tilings;           // [cloth that has a fabric]
   std::unique_ptr<ClothScene> scene;          // of the frame; null where that has changed
   std::vector<BcsdfTable> materials;          // of the scene
-  std::vector<Warning> warnings;              // of the packs
+  std::vector<std::shared_ptr<const FarForm>> far_forms;               // [part], or none
+  std::vector<Warning> warnings;                                       // of the packs
   std::vector<std::shared_ptr<const InteractiveSurface>> interactive;  // [surface cloth]
 };
 
@@ -211,7 +212,7 @@ VisibilityBlend SceneJob::blend_for(RenderMethod method) const {
 Needs SceneJob::needs_for(RenderMethod method, const fs::path& fabric) const {
   Needs needs = needs_of(method, config_.lights, blend_for(method));
   needs.order = variant_.of(fabric).order;
-  return needs;
+  return needs_with_far_forms(needs, method, config_.far_from.has_value(), config_.bounces);
 }
 
 std::vector<StageCost> SceneJob::precompute_costs(const PictureRequest& request) {
@@ -263,6 +264,8 @@ std::string SceneJob::picture_key(const PictureRequest& request) {
                       fmt::format("blend {} {}", variant_.blend.from, variant_.blend.to));
   values.emplace_back("shadow_sigma_mm",
                       config_.shadow_sigma_mm ? fmt::format("{}", *config_.shadow_sigma_mm) : "");
+  if (config_.bounces > 0) values.emplace_back("bounces", fmt::format("{}", config_.bounces));
+  if (config_.far_from) values.emplace_back("far_from", fmt::format("{}", *config_.far_from));
   for (const Artifact& pack : packs_for(request.method)) values.emplace_back("pack", pack.key);
   for (const ClothConfig& cloth : config_.cloths) {
     if (cloth.mesh) values.emplace_back("mesh", content_hash_of_file(cloth.mesh->path));
@@ -342,6 +345,13 @@ std::unique_ptr<SceneJob::Loaded> SceneJob::load_fabrics(RenderMethod method) {
       loaded->tilings.emplace_back(tiles.front());
     }
   }
+  std::map<const FabricPack*, std::shared_ptr<const FarForm>> far_forms;
+  for (const FabricPack* pack : loaded->part_packs) {
+    if (!pack->far) break;  // all have it, or none
+    std::shared_ptr<const FarForm>& own = far_forms[pack];
+    if (!own) own = std::make_shared<const FarForm>(*pack->far);
+    loaded->far_forms.push_back(own);
+  }
   for (const auto& [file, pack] : loaded->packs) {
     for (Warning& warning : pack_warnings(pack, *loaded->tiles.at(file)))
       loaded->warnings.push_back(std::move(warning));
@@ -374,11 +384,16 @@ std::unique_ptr<SceneJob::Shading> SceneJob::shading_for(const PictureRequest& r
                             path_tracer_settings(request));
     return shading;
   }
+  std::optional<float> far_from;
+  if (config_.far_from) far_from = static_cast<float>(*config_.far_from);
   const PrecomputedSettings settings{.seed = request.seed,
                                      .method = request.method,
                                      .shadow_sigma_mm = config_.shadow_sigma_mm,
                                      .blend = blend_for(request.method),
                                      .transfer_order = transfer_order,
+                                     .far_from = far_from,
+                                     .bounces = config_.bounces,
+                                     .far_forms = loaded.far_forms,
                                      .interactive = loaded.interactive};
   shading->renderer.emplace(*loaded.scene, loaded.part_packs, config_.lights, config_.background,
                             settings);

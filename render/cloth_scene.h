@@ -101,6 +101,11 @@ class ClothScene {
   const ClothTiling& tiling(std::uint32_t cloth) const { return cloths_[cloth].tiling; }
   std::size_t part_count() const { return parts_.size(); }
   std::uint32_t cloth_of_part(std::uint32_t part) const { return parts_[part].cloth; }
+  /// The part of a cloth that covers a point of its fabric space.
+  std::uint32_t part_at(std::uint32_t cloth, const Vec3d& fabric) const {
+    const ClothTiling& tiling = cloths_[cloth].tiling;
+    return cloths_[cloth].first_part + tiling.block_at(tiling.place_of(fabric)).exemplar;
+  }
   const TileScene& tile(std::uint32_t part) const { return *parts_[part].tile; }
   const Exemplar& exemplar(std::uint32_t part) const { return parts_[part].tile->exemplar(); }
   /// Materials of all fabrics in one list, each fabric once: a fiber's index is
@@ -119,7 +124,16 @@ class ClothScene {
   /// std::optional<FiberHit> looks along a ray in the tile of the part's exemplar, from its origin
   /// to t_max. own_fiber is kNoFiber or the fiber to ignore.
   template <class Query>
-  std::optional<ShellHit> first_hit(const SceneRay& ray, RayReach reach, Query&& query) const;
+  std::optional<ShellHit> first_hit(const SceneRay& ray, RayReach reach, Query&& query) const {
+    return first_hit(ray, reach, query,
+                     [](std::uint32_t, const ShellInterval&) { return Passing::kLook; });
+  }
+  /// What a ray does with one interval of a shell: looks for fibers, passes it, or ends there.
+  enum class Passing : std::uint8_t { kLook, kSkip, kStop };
+  /// The same; pass(cloth, interval) -> Passing is asked first.
+  template <class Query, class Pass>
+  std::optional<ShellHit> first_hit(const SceneRay& ray, RayReach reach, Query&& query,
+                                    Pass&& pass) const;
 
   /// First fiber along the ray.
   std::optional<ShellHit> first_fiber(const SceneRay& ray,
@@ -172,6 +186,14 @@ class ClothScene {
   /// A world direction in the fabric space of the hit, unit length.
   Vec3 fabric_direction(const ShellHit& hit, const Vec3& direction) const {
     return (shell(hit.cloth).fabric_from_world(hit.tet) * direction).normalized();
+  }
+  /// The same without the steps between tetrahedra: the frame is turned to the cloth's normal
+  /// there, which is interpolated between vertices.
+  Vec3 smooth_fabric_direction(const ShellHit& hit, const Vec3& direction) const {
+    const Vec3d normal = surface_point(hit, ClothSide::kFace).normal;
+    const Vec3d own = shell(hit.cloth).fabric_from_world(hit.tet).row(2).transpose().cast<double>();
+    const Vec3d turned = Eigen::Quaterniond::FromTwoVectors(normal, own) * direction.cast<double>();
+    return fabric_direction(hit, turned.cast<float>());
   }
   /// Unit tangent of the hit fiber in world space.
   Vec3 world_tangent(const ShellHit& hit) const {
@@ -265,13 +287,19 @@ void ClothScene::walk(const SceneRay& ray, RayReach reach, const double& limit,
   }
 }
 
-template <class Query>
-std::optional<ShellHit> ClothScene::first_hit(const SceneRay& ray, RayReach reach,
-                                              Query&& query) const {
+template <class Query, class Pass>
+std::optional<ShellHit> ClothScene::first_hit(const SceneRay& ray, RayReach reach, Query&& query,
+                                              Pass&& pass) const {
   std::optional<ShellHit> best;
   double limit = ray.t_max;
   walk(ray, reach, limit,
        [&](std::uint32_t cloth, const ShellInterval& interval, const OwnFiber& own) {
+         const Passing passing = pass(cloth, interval);
+         if (passing == Passing::kSkip) return false;
+         if (passing == Passing::kStop) {
+           limit = interval.t1;
+           return true;
+         }
          const Cloth& here = cloths_[cloth];
          const LocalRay local =
              local_ray(interval, here.tiling, ray.from != nullptr && interval.t0 == 0.0);

@@ -20,11 +20,23 @@
 
 namespace heddle {
 
+/// Segment or cell of what is no fiber.
+inline constexpr std::uint32_t kNoSegment = 0xffffffffU;
+
 /// A sample that sees fibers.
 struct SeenFiber {
   std::uint32_t sample;  // which of the block's
   ShellHit hit;
   ShadingPoint point;
+  float weight = 1;  // share of the sample
+};
+
+/// A sample that sees a fabric's far form, in the mean over many fibers.
+struct SeenFar {
+  std::uint32_t sample;  // which of the block's
+  ShellHit hit;          // at the mean height of the fibers seen; of no segment
+  Vec3 wo;               // fabric space
+  float weight;          // share of the sample
 };
 
 /// A sample that sees cloth without fibers.
@@ -32,7 +44,8 @@ struct SeenSurface {
   std::uint32_t sample;   // which of the block's
   std::uint32_t surface;  // of ClothScene::surfaces()
   SurfaceHit hit;
-  Vec3 wo;  // world
+  Vec3 wo;           // world
+  float weight = 1;  // share of the sample
 };
 
 /// Samples first .. last - 1 of every pixel of `block`: sample k is number first + k % per_pixel()
@@ -42,10 +55,11 @@ struct GBuffer {
   int first = 0;
   int last = 0;
   std::uint64_t frame_width = 0;  // px, of the whole picture
-  // [sample] meets cloth or a mesh
-  std::vector<std::uint8_t> covered;
-  // In the order of their samples; a covered sample in neither sees black.
+  // [sample] share that meets cloth or a mesh
+  std::vector<float> covered;
+  // In the order of their samples; what of a covered sample is in none of them sees black.
   std::vector<SeenFiber> fibers;
+  std::vector<SeenFar> far;
   std::vector<SeenSurface> surfaces;
 
   int per_pixel() const { return last - first; }
@@ -57,22 +71,28 @@ struct GBuffer {
   RandomStream random(std::uint64_t seed, RandomStage stage, std::uint32_t sample) const;
 };
 
+class FarWay;
+
 class GBufferPass {
  public:
   /// packs: [part of the scene]. bricks: the same, or empty: eye rays then look for the fibers
-  /// themselves. The scene and the packs outlive the object.
+  /// themselves. far_from: pixels that cover so many repeats of a fabric see nothing but its far
+  /// form, those of less than half as many nothing of it; no pixel does where empty. The scene and
+  /// the packs outlive the object.
   GBufferPass(const ClothScene& scene, std::vector<const FabricPack*> packs,
-              std::vector<std::shared_ptr<const IdBricks>> bricks, std::uint64_t seed);
+              std::vector<std::shared_ptr<const IdBricks>> bricks, std::optional<float> far_from,
+              std::uint64_t seed);
 
   GBuffer run(const Camera& camera, const PixelRect& block, int first, int last) const;
 
  private:
-  std::optional<ShellHit> first_fiber(const SceneRay& ray) const;
-  void look(const EyeRay& ray, std::uint32_t sample, GBuffer& g_buffer) const;
+  std::optional<ShellHit> first_fiber(const SceneRay& ray, FarWay& way) const;
+  void look(const EyeRay& ray, std::uint32_t sample, float far_draw, GBuffer& g_buffer) const;
 
   const ClothScene* scene_;
   std::vector<const FabricPack*> packs_;
   std::vector<std::shared_ptr<const IdBricks>> bricks_;
+  std::optional<float> far_from_;
   std::uint64_t seed_;
 };
 
