@@ -82,6 +82,8 @@ int render_within(double tolerance, const RenderOptions& options, Job& job) {
   const Way& way = plan.ways[*plan.chosen];
   SceneJob scene(options.scene, job.context(), way.settings.variant);
   PictureRequest request = plan.request;
+  request.layers = scene.config().layers;
+  request.light_groups = true;
   request.spp = first_samples(way.candidate, tolerance);
   Estimate noise_square;  // of a sample
   int spp = 0;
@@ -105,7 +107,7 @@ int render_within(double tolerance, const RenderOptions& options, Job& job) {
   nlohmann::ordered_json report = picture_report(picture);
   report["plan"] = plan_json(plan);
   report["expected_error"] = error;
-  write_picture(options.output, picture, report);
+  write_picture(options.output, picture, report, scene.config().look);
   job.add_artifact(options.output);
   job.add_entry("plan", report["plan"]);
   job.add_entry("expected_error", error);
@@ -126,7 +128,7 @@ int render_command(const RenderOptions& options, const CommonOptions& common) {
   }
   if (options.tolerance) return render_within(*options.tolerance, options, job);
   SceneJob scene(options.scene, job.context(), variant_of_order(options.scene, options.order));
-  PictureRequest request = scene.request(find_view(scene.config(), options.view));
+  PictureRequest request = scene.request_with_layers(find_view(scene.config(), options.view));
   apply_overrides(options, request);
   const PictureResult picture = scene.render(request, "render");
   if (options.noise) {
@@ -140,7 +142,7 @@ int render_command(const RenderOptions& options, const CommonOptions& common) {
       job.console().say(done);
     }
   }
-  write_picture(options.output, picture, picture_report(picture));
+  write_picture(options.output, picture, picture_report(picture), scene.config().look);
   job.add_artifact(options.output);
   job.finish();
   return 0;

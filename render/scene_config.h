@@ -19,8 +19,10 @@
 #include "render/lights.h"
 #include "render/mesh_file.h"
 #include "render/methods.h"
+#include "render/pixel_filter.h"
 #include "render/surface/microcylinder.h"
 #include "render/surface/surface_model.h"
+#include "render/tone_map.h"
 #include "render/yarn_drift.h"
 #include "render/yarn_tints.h"
 
@@ -67,6 +69,7 @@ struct PatternConfig {
 };
 
 struct ClothConfig {
+  std::string name;              // in mattes; empty: by its number
   std::optional<MeshFile> mesh;  // an OBJ with UVs, or else a flat swatch
   double uv_size_mm = 0;         // flat cloth (mm) per unit of UV; meshes only
   FabricPlacement on_uvs;        // meshes only
@@ -106,10 +109,21 @@ struct ViewConfig {
   std::optional<ReferenceConfig> reference;
 };
 
+/// Layers of a picture that are made when asked for.
+struct LayerChoice {
+  bool lobes = false;        // reflected, transmitted
+  bool surface = false;      // albedo, N, P, UV
+  bool cryptomatte = false;  // of cloths, yarns and fibers
+
+  bool any() const { return lobes || surface || cryptomatte; }
+};
+
 struct SceneConfig {
   std::string name;
   std::vector<ViewConfig> views;  // that of [camera] first, then every [[view]]
   std::vector<Light> lights;
+  // [Light::group] names; one without a name where no light has a group
+  std::vector<std::string> light_groups;
   std::vector<std::filesystem::path> light_files;  // pictures that the lights were read from
   Rgb background = Rgb(0, 0, 0);  // radiance seen by eye rays that hit nothing; lights nothing
   std::vector<ClothConfig> cloths;
@@ -118,6 +132,9 @@ struct SceneConfig {
   std::uint64_t seed = 1;
   // smoothing of global visibility; from the fabric where absent
   std::optional<double> shadow_sigma_mm;
+  PixelFilter filter;
+  LayerChoice layers;
+  ScreenLook look;  // of the PNG
 };
 
 /// Do shapes depend on the cameras (subdivide_px)?
