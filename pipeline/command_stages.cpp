@@ -123,6 +123,9 @@ int stage_command(const StageOptions& options, const CommonOptions& common) {
         artifact = stages.transfer(options.order);
       }
       break;
+    case StageTarget::kFar:
+      artifact = stages.far(options.order);
+      break;
     case StageTarget::kAccuracy:
       artifact = stages.accuracy();
       break;

@@ -25,7 +25,7 @@ struct CommonOptions {
   bool json = false;  // a report for programs on standard output
 };
 
-enum class StageTarget { kSynth, kVisibility, kTransfer, kPack, kAccuracy };
+enum class StageTarget { kSynth, kVisibility, kTransfer, kFar, kPack, kAccuracy };
 
 struct StageOptions {
   std::filesystem::path fabric;

@@ -119,7 +119,8 @@ void add_stage_command(CLI::App& app, Options& options, const std::string& name,
   add_building(*command, options);
   add_fabric_seed(*command, options);
   command->add_option("FABRIC.toml", options.stage.fabric, "Fabric config")->required();
-  if (target == StageTarget::kTransfer || target == StageTarget::kPack)
+  if (target == StageTarget::kTransfer || target == StageTarget::kFar ||
+      target == StageTarget::kPack)
     add_order(*command, options.stage.order);
   if (target == StageTarget::kPack) {
     command->add_option("-o,--output,--outfile", options.stage.output,
@@ -156,6 +157,7 @@ const char* kept_after_signal(const std::string& command) {
       {"compare", kNothing},
       {"eval", "the answers printed so far are complete"},
       {"export", kNothing},
+      {"far", kStages},
       {"info", kNothing},
       {"pack", kStages},
       {"plan", kMeasurement},
@@ -209,12 +211,14 @@ void add_stages(CLI::App& app, Options& options, Actions& actions) {
                     StageTarget::kVisibility, true);
   add_stage_command(app, options, "transfer", "Indirect light transfer of every cell",
                     StageTarget::kTransfer, true);
+  add_stage_command(app, options, "far", "The fabric as seen from afar", StageTarget::kFar, false);
   add_stage_command(app, options, "pack", "The folder that a renderer opens", StageTarget::kPack,
                     false);
   add_stage_command(app, options, "accuracy",
                     "Errors and times of the methods on a fabric: the table behind plans",
                     StageTarget::kAccuracy, false);
-  for (const char* name : {"precompute", "synth", "visibility", "transfer", "pack", "accuracy"}) {
+  for (const char* name :
+       {"precompute", "synth", "visibility", "transfer", "far", "pack", "accuracy"}) {
     actions[name] = [&options] {
       if (!options.shard.empty()) options.stage.shard = parse_shard(options.shard);
       return stage_command(options.stage, options.common);

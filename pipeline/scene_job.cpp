@@ -99,6 +99,7 @@ struct SceneJob::Loaded {
   std::vector<const FabricPack*> part_packs;  // [part of the scene]
   std::unique_ptr<ClothScene> scene;
   std::vector<BcsdfTable> materials;                                   // of the scene
+  std::vector<std::shared_ptr<const FarForm>> far_forms;               // [part], or none
   std::vector<Warning> warnings;                                       // of the packs
   std::vector<std::shared_ptr<const InteractiveSurface>> interactive;  // [surface cloth]
 };
@@ -207,7 +208,7 @@ VisibilityBlend SceneJob::blend_for(RenderMethod method) const {
 Needs SceneJob::needs_for(RenderMethod method, const fs::path& fabric) const {
   Needs needs = needs_of(method, config_.lights, blend_for(method));
   needs.order = variant_.of(fabric).order;
-  return needs;
+  return needs_with_far_forms(needs, method, config_.far_from.has_value(), config_.bounces);
 }
 
 std::vector<StageCost> SceneJob::precompute_costs(const PictureRequest& request) {
@@ -266,6 +267,8 @@ std::string SceneJob::picture_key(const PictureRequest& request) {
                       fmt::format("blend {} {}", variant_.blend.from, variant_.blend.to));
   values.emplace_back("shadow_sigma_mm",
                       config_.shadow_sigma_mm ? fmt::format("{}", *config_.shadow_sigma_mm) : "");
+  if (config_.bounces > 0) values.emplace_back("bounces", fmt::format("{}", config_.bounces));
+  if (config_.far_from) values.emplace_back("far_from", fmt::format("{}", *config_.far_from));
   for (const Artifact& pack : packs_for(request.method)) values.emplace_back("pack", pack.key);
   for (const ClothConfig& cloth : config_.cloths) {
     if (cloth.mesh) values.emplace_back("mesh", content_hash_of_file(cloth.mesh->path));
@@ -328,6 +331,13 @@ const SceneJob::Loaded& SceneJob::loaded_for(RenderMethod method) {
   }
   // cannot be moved: built in place
   loaded->scene.reset(new ClothScene(make_cloth_scene(config_, tilings)));
+  std::map<const FabricPack*, std::shared_ptr<const FarForm>> far_forms;
+  for (const FabricPack* pack : loaded->part_packs) {
+    if (!pack->far) break;  // all have it, or none
+    std::shared_ptr<const FarForm>& own = far_forms[pack];
+    if (!own) own = std::make_shared<const FarForm>(*pack->far);
+    loaded->far_forms.push_back(own);
+  }
   for (const auto& [file, pack] : loaded->packs) {
     for (Warning& warning : pack_warnings(pack, *loaded->tiles.at(file)))
       loaded->warnings.push_back(std::move(warning));
@@ -379,11 +389,16 @@ std::unique_ptr<SceneJob::Shading> SceneJob::shading_for(const PictureRequest& r
                             settings, reflecting);
     return shading;
   }
+  std::optional<float> far_from;
+  if (config_.far_from) far_from = static_cast<float>(*config_.far_from);
   PrecomputedSettings settings{.seed = request.seed,
                                .method = request.method,
                                .shadow_sigma_mm = config_.shadow_sigma_mm,
                                .blend = blend_for(request.method),
                                .transfer_order = transfer_order,
+                               .far_from = far_from,
+                               .bounces = config_.bounces,
+                               .far_forms = loaded.far_forms,
                                .interactive = loaded.interactive,
                                .filter = request.filter};
   for (const FabricPack* pack : loaded.part_packs) {
@@ -433,7 +448,8 @@ const ClothScene& SceneJob::fibers_scene() {
 void SceneJob::add_layers(const PictureRequest& request, const Shading& shading,
                           const Camera& camera, FrameBuffers& frame) {
   const Loaded& loaded = loaded_for(request.method);
-  const GBufferPass own_rays(*loaded.scene, loaded.part_packs, {}, request.seed, request.filter);
+  const GBufferPass own_rays(*loaded.scene, loaded.part_packs, {}, {}, request.seed,
+                             request.filter);
   const auto eye_rays = [&](const PixelRect& block, int first, int last) {
     stop_if_interrupted();
     return shading.renderers.empty()

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "fibers/baked/fabric_pack.h"
+#include "fibers/cloth/bundle_tangents.h"
 #include "fibers/cloth/synthesize.h"
 #include "fibers/tracing/tile_scene.h"
 #include "formats/atomic_file.h"
@@ -19,6 +20,7 @@
 #include "pipeline/artifact_record.h"
 #include "pipeline/interrupt.h"
 #include "pipeline/version.h"
+#include "precompute/far_bake.h"
 #include "precompute/sg_fit.h"
 #include "precompute/ssdf_fit.h"
 #include "precompute/visibility_maps.h"
@@ -41,7 +43,7 @@ int version_of(std::string_view stage) {
   static const std::map<std::string_view, int> versions = {
       {"geometry", 1},        {"synth", 3},    {"maps", 3}, {"ssdf", 1},     {"sg", 1},
       {"transfer", 5},        {"voxelize", 2}, {"pack", 1}, {"accuracy", 8}, {"surface-maps", 1},
-      {"surface-weights", 2},
+      {"surface-weights", 2}, {"far", 1},
   };
   return versions.at(stage);
 }
@@ -611,6 +613,39 @@ Artifact FabricStages::volume() {
   });
 }
 
+Stage FabricStages::far_stage(std::optional<int> order) {
+  return make_stage("far", ".safetensors", "",
+                    {{"fibers", synth_stage().key},
+                     {"ssdf", ssdf_stage().key},
+                     {"transfer", transfer_stage(transfer_settings(order)).key}});
+}
+
+Artifact FabricStages::far(std::optional<int> order) {
+  const Stage stage = far_stage(order);
+  return artifact_of(stage, [&](const fs::path& path, StageResult&) {
+    const SsdfVisibility visible = read_ssdf(ssdf().path);
+    const Transfer light = read_transfer(transfer(order).path);
+    const std::vector<BcsdfTable> materials(exemplar().scattering.begin(),
+                                            exemplar().scattering.end());
+    std::vector<Vec3> bundles;
+    if (light.cones) bundles = bundle_tangents(exemplar());
+    const FabricConfig& config = document_.config;
+    const double repeat_area = static_cast<double>(exemplar().width_mm) * exemplar().height_mm /
+                               (config.repeats_x * config.repeats_y);
+    FarSettings settings;
+    settings.seed = config.seed;
+    announce(context_->console, "far", DirectionGrid(settings.resolution).count(), "views",
+             static_cast<double>(
+                 far_bake_bytes(exemplar().segment_count(), light.both_sides, settings)));
+    Progress progress(*context_->console, stage.name, "%", 100);
+    write_far_table(
+        path,
+        bake_far({&scene(), &visible, &light, bundles, materials, std::sqrt(repeat_area)}, settings,
+                 percent_of(progress)),
+        stage.metadata);
+  });
+}
+
 Artifact FabricStages::pack(const Needs& needs) {
   std::vector<std::pair<std::string, std::string>> upstream = {
       {"fibers.safetensors", synth_stage().key}};
@@ -621,6 +656,7 @@ Artifact FabricStages::pack(const Needs& needs) {
                           transfer_stage(transfer_settings(needs.order)).key);
   }
   if (needs.volume) upstream.emplace_back("volume.vdb", volume_stage().key);
+  if (needs.far) upstream.emplace_back("far.safetensors", far_stage(needs.order).key);
   upstream.emplace_back("light_from", light_from());
   const Stage stage = make_stage("pack", "", document_.config.name, std::move(upstream));
   return artifact_of(
@@ -648,6 +684,7 @@ void FabricStages::fill_pack(const fs::path& folder, const std::string& key, con
     manifest.counts["cells"] = read_transfer(folder / "transfer.safetensors").cell_count();
   }
   if (needs.volume) add("volume.vdb", volume());
+  if (needs.far) add("far.safetensors", far(needs.order));
   write_manifest(folder, std::move(manifest));
 }
 

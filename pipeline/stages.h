@@ -11,6 +11,7 @@
 //   sg          maps, [visibility]                          sg.safetensors           SgVisibility
 //   transfer    fibers, [transfer], light_from   in chunks  transfer.safetensors     Transfer
 //   voxelize    geometry, [volume]                          volume.vdb               IdVolume
+//   far         fibers, ssdf, transfer                      far.safetensors          FarTable
 //   pack        what the pack is to hold                    folder                   FabricPack
 //   accuracy    all of the above                            KEY.json                 AccuracyTable
 //
@@ -47,8 +48,9 @@
 
 namespace heddle {
 
+/// All but the far form, which scenes ask for.
 inline constexpr Needs kEverything{
-    .ssdf = true, .sgs = true, .transfer = true, .volume = true, .order = {}};
+    .ssdf = true, .sgs = true, .transfer = true, .volume = true, .far = false, .order = {}};
 
 /// kPrinted: segment origins on the fiber's axis, and sums of Gaussians by the paper's axes,
 /// Voronoi weights and sharpness 128, whatever [visibility] says of them (Khungurn 2017,
@@ -193,6 +195,7 @@ class FabricStages {
   Artifact sgs();
   Artifact transfer(std::optional<int> order);
   Artifact volume();
+  Artifact far(std::optional<int> order);
   Artifact pack(const Needs& needs);
 
   /// What the methods are worth on this fabric (pipeline/accuracy/measure_accuracy.h). With a
@@ -248,6 +251,7 @@ class FabricStages {
   Stage ssdf_stage();
   Stage sg_stage();
   Stage volume_stage();
+  Stage far_stage(std::optional<int> order);
   Stage accuracy_stage(const SurfaceFabric* surface);
   AccuracyTable measure_accuracy_table();
   double transfer_order_ratio(int order);

@@ -16,8 +16,6 @@ namespace {
 constexpr double kShellMargin = 1e-3;
 // Distance of an underlay from the shell, in thicknesses.
 constexpr double kUnderlayGap = 1e-2;
-// Start of shadow rays above a shell or a mesh: some 30 times the rounding of a float at 300 mm.
-constexpr double kLiftMm = 1e-3;
 
 double thickness(const ClothTiling& tiling) {
   return static_cast<double>(tiling.z_max()) - static_cast<double>(tiling.z_min());
@@ -135,7 +133,7 @@ bool ClothScene::occluded(const SceneRay& ray) const {
 
 bool ClothScene::globally_visible(const Shell::SurfacePoint& point, const Vec3& direction,
                                   double distance) const {
-  const Vec3 origin = (point.position + kLiftMm * point.normal).cast<float>();
+  const Vec3 origin = lifted(point).cast<float>();
   const auto reach = static_cast<float>(distance);
   return !boundary_.occluded(origin, direction, reach) &&
          !meshes_.occluded(origin, direction, reach);
@@ -143,7 +141,7 @@ bool ClothScene::globally_visible(const Shell::SurfacePoint& point, const Vec3& 
 
 bool ClothScene::visible(const Shell::SurfacePoint& point, const Vec3& direction,
                          double distance) const {
-  return !occluded({point.position + kLiftMm * point.normal, direction, nullptr, distance});
+  return !occluded({lifted(point), direction, nullptr, distance});
 }
 
 double ClothScene::distance_to_cloth(const Vec3d& point) const {

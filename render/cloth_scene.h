@@ -98,6 +98,11 @@ class ClothScene {
   const ClothTiling& tiling(std::uint32_t cloth) const { return cloths_[cloth].tiling; }
   std::size_t part_count() const { return parts_.size(); }
   std::uint32_t cloth_of_part(std::uint32_t part) const { return parts_[part].cloth; }
+  /// The part of a cloth that covers a point of its fabric space.
+  std::uint32_t part_at(std::uint32_t cloth, const Vec3d& fabric) const {
+    const ClothTiling& tiling = cloths_[cloth].tiling;
+    return cloths_[cloth].first_part + tiling.block_at(tiling.place_of(fabric)).exemplar;
+  }
   const TileScene& tile(std::uint32_t part) const { return *parts_[part].tile; }
   const Exemplar& exemplar(std::uint32_t part) const { return parts_[part].tile->exemplar(); }
   /// Materials of all fabrics in one list, each fabric once: a fiber's index is
@@ -116,7 +121,16 @@ class ClothScene {
   /// std::optional<FiberHit> looks along a ray in the tile of the part's exemplar, from its origin
   /// to t_max. own_fiber is kNoFiber or the fiber to ignore.
   template <class Query>
-  std::optional<ShellHit> first_hit(const SceneRay& ray, RayReach reach, Query&& query) const;
+  std::optional<ShellHit> first_hit(const SceneRay& ray, RayReach reach, Query&& query) const {
+    return first_hit(ray, reach, query,
+                     [](std::uint32_t, const ShellInterval&) { return Passing::kLook; });
+  }
+  /// What a ray does with one interval of a shell: looks for fibers, passes it, or ends there.
+  enum class Passing : std::uint8_t { kLook, kSkip, kStop };
+  /// The same; pass(cloth, interval) -> Passing is asked first.
+  template <class Query, class Pass>
+  std::optional<ShellHit> first_hit(const SceneRay& ray, RayReach reach, Query&& query,
+                                    Pass&& pass) const;
 
   /// First fiber along the ray.
   std::optional<ShellHit> first_fiber(const SceneRay& ray,
@@ -149,6 +163,10 @@ class ClothScene {
   /// triangle.
   double distance_to_cloth(const Vec3d& point) const;
 
+  /// Where a ray from a surface point starts, a little off the surface.
+  static Vec3d lifted(const Shell::SurfacePoint& point) {
+    return point.position + kLiftMm * point.normal;
+  }
   /// Surface point of the shell straight over (kFace) or under (kBack) a hit.
   Shell::SurfacePoint surface_point(const ShellHit& hit, ClothSide side) const {
     return shell(hit.cloth).surface_point(hit.tet / 3, hit.fabric.head<2>(), side);
@@ -204,6 +222,8 @@ class ClothScene {
   static LocalRay local_ray(const ShellInterval& interval, const ClothTiling& tiling,
                             bool at_start);
 
+  // Start of shadow rays above a shell or a mesh: some 30 times the rounding of a float at 300 mm.
+  static constexpr double kLiftMm = 1e-3;
   // Shorter intervals are left to the margins of their neighbours.
   static constexpr double kShortestMm = 1e-7;
   static constexpr double kMarginMm = 1e-6;
@@ -259,13 +279,19 @@ void ClothScene::walk(const SceneRay& ray, RayReach reach, const double& limit,
   }
 }
 
-template <class Query>
-std::optional<ShellHit> ClothScene::first_hit(const SceneRay& ray, RayReach reach,
-                                              Query&& query) const {
+template <class Query, class Pass>
+std::optional<ShellHit> ClothScene::first_hit(const SceneRay& ray, RayReach reach, Query&& query,
+                                              Pass&& pass) const {
   std::optional<ShellHit> best;
   double limit = ray.t_max;
   walk(ray, reach, limit,
        [&](std::uint32_t cloth, const ShellInterval& interval, const OwnFiber& own) {
+         const Passing passing = pass(cloth, interval);
+         if (passing == Passing::kSkip) return false;
+         if (passing == Passing::kStop) {
+           limit = interval.t1;
+           return true;
+         }
          const Cloth& here = cloths_[cloth];
          const LocalRay local =
              local_ray(interval, here.tiling, ray.from != nullptr && interval.t0 == 0.0);

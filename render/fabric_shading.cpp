@@ -51,6 +51,7 @@ void TransferShading::shade(const GBuffer& g_buffer, const LightVisibility& visi
   for (const std::uint32_t k : fibers) {
     const SeenFiber& fiber = g_buffer.fibers[k];
     const ShadingPoint& point = fiber.point;
+    const float weight = fiber.weight;
     EyeSample& sample = seen[fiber.sample];
     IncomingField field;
     std::fill_n(field.begin(), values, 0.0F);
@@ -62,10 +63,11 @@ void TransferShading::shade(const GBuffer& g_buffer, const LightVisibility& visi
       const SeenLight light = seen_from(lights_[l], fiber.hit.position);
       const DirectionPair axis = {light.axis, scene_->fabric_direction(fiber.hit, light.axis)};
       if (visible.at_point) {
-        const Rgb single = light.irradiance * scattered_once(*single_, point, light, axis);
+        const Rgb single = weight * light.irradiance * scattered_once(*single_, point, light, axis);
         sample.single += single;
         if (reflecting_) {
-          const Rgb reflected = light.irradiance * scattered_once(*reflecting_, point, light, axis);
+          const Rgb reflected =
+              weight * light.irradiance * scattered_once(*reflecting_, point, light, axis);
           sample.transmitted += (single - reflected).max(0.0F);
         }
       }
@@ -74,7 +76,8 @@ void TransferShading::shade(const GBuffer& g_buffer, const LightVisibility& visi
       if (lights_[l].is_near()) {
         if (!any_near) multiple_.clear(near_light);
         any_near = true;
-        sample.multiple += multiple_.add(light, axis.fabric, *near_shapes_, point, near_light);
+        sample.multiple +=
+            weight * multiple_.add(light, axis.fabric, *near_shapes_, point, near_light);
         continue;
       }
       KeptLight& own = kept[l];
@@ -84,7 +87,7 @@ void TransferShading::shade(const GBuffer& g_buffer, const LightVisibility& visi
         multiple_.incoming(point.cell, shapes_[l], axis.fabric, own.light);
       }
       for (int j = 0; j < values; ++j) field[j] += light.irradiance[j % 3] * own.light.harmonics[j];
-      sample.multiple += light.irradiance *
+      sample.multiple += weight * light.irradiance *
                          multiple_.outgoing_from_cones(own.light, shapes_[l].on_cones(),
                                                        axis.fabric, point.segment, point.material,
                                                        point.tangent.fabric, point.wo.fabric);
@@ -92,9 +95,25 @@ void TransferShading::shade(const GBuffer& g_buffer, const LightVisibility& visi
     if (any_near) multiple_.incoming(point.cell, *near_shapes_, near_light, field);
     if (any_nearby) {
       sample.multiple +=
-          multiple_.outgoing(field, point.material, point.tangent.fabric, point.wo.fabric);
+          weight * multiple_.outgoing(field, point.material, point.tangent.fabric, point.wo.fabric);
     }
   }
+}
+
+Rgb TransferShading::under(const SeenFiber& fiber, const SeenLight& light) const {
+  const ShadingPoint& point = fiber.point;
+  const DirectionPair axis = {light.axis, scene_->fabric_direction(fiber.hit, light.axis)};
+  const Rgb single = light.irradiance * (light.is_directional ? single_->directional(point, axis)
+                                                              : single_->spherical_gaussian(
+                                                                    point, axis, light.sharpness));
+  SummedLight sum;
+  multiple_.clear(sum);
+  const Rgb on_cones = multiple_.add(light, axis.fabric, *near_shapes_, point, sum);
+  IncomingField field;
+  std::fill_n(field.begin(), 3 * transfer_->coefficients(), 0.0F);
+  multiple_.incoming(point.cell, *near_shapes_, sum, field);
+  return single + on_cones +
+         multiple_.outgoing(field, point.material, point.tangent.fabric, point.wo.fabric);
 }
 
 DualScatteringShading::DualScatteringShading(const ShadingInputs& inputs)
@@ -112,7 +131,8 @@ void DualScatteringShading::shade(const GBuffer& g_buffer, const LightVisibility
       if (!visibility.of(k, l).at_point) continue;
       const DualScattering::Parts parts =
           scattered(g_buffer.fibers[k], visibility.direction[k * lights_.size() + l]);
-      const Rgb irradiance = seen_from(lights_[l], g_buffer.fibers[k].hit.position).irradiance;
+      const Rgb irradiance = g_buffer.fibers[k].weight *
+                             seen_from(lights_[l], g_buffer.fibers[k].hit.position).irradiance;
       sample.single += irradiance * parts.single;
       sample.multiple += irradiance * parts.multiple;
     }

@@ -46,6 +46,9 @@ class FabricShading {
   /// one part of the fabric, those of one cell and tetrahedron side by side. seen: [sample].
   virtual void shade(const GBuffer& g_buffer, const LightVisibility& visibility,
                      std::span<const std::uint32_t> fibers, std::span<EyeSample> seen) const = 0;
+  /// Radiance from a fiber under one more light at infinity, which reaches it; 0 where the method
+  /// knows no such light.
+  virtual Rgb under(const SeenFiber&, const SeenLight&) const { return Rgb::Zero(); }
 };
 
 /// Single scattering by a model, multiple scattering by the pack's transfer. Incoming fields of all
@@ -58,6 +61,7 @@ class TransferShading final : public FabricShading {
                   std::unique_ptr<const SingleScatteringModel> reflecting = {});
   void shade(const GBuffer& g_buffer, const LightVisibility& visibility,
              std::span<const std::uint32_t> fibers, std::span<EyeSample> seen) const override;
+  Rgb under(const SeenFiber& fiber, const SeenLight& light) const override;
 
  private:
   const ClothScene* scene_;

@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "render/far_way.h"
+
 namespace heddle {
 
 RandomStream GBuffer::random(std::uint64_t seed, RandomStage stage, std::uint32_t sample) const {
@@ -14,11 +16,12 @@ RandomStream GBuffer::random(std::uint64_t seed, RandomStage stage, std::uint32_
 }
 
 GBufferPass::GBufferPass(const ClothScene& scene, std::vector<const FabricPack*> packs,
-                         std::vector<std::shared_ptr<const IdBricks>> bricks, std::uint64_t seed,
-                         PixelFilter filter)
+                         std::vector<std::shared_ptr<const IdBricks>> bricks,
+                         std::optional<float> far_from, std::uint64_t seed, PixelFilter filter)
     : scene_(&scene),
       packs_(std::move(packs)),
       bricks_(std::move(bricks)),
+      far_from_(far_from),
       seed_(seed),
       filter_(std::move(filter)) {}
 
@@ -34,26 +37,35 @@ GBuffer GBufferPass::run(const Camera& camera, const PixelRect& block, int first
     RandomStream random = g_buffer.random(seed_, RandomStage::kEyeRay, sample);
     const double x = block.x0 + pixel % block.width + filter_.place(random.uniform_double());
     const double y = block.y0 + pixel / block.width + filter_.place(random.uniform_double());
-    look(camera.ray(x, y), sample, g_buffer);
+    const EyeRay ray = camera.ray(x, y);
+    look(ray, sample, far_from_ ? random.uniform() : 0.0F, g_buffer);
   }
   return g_buffer;
 }
 
-std::optional<ShellHit> GBufferPass::first_fiber(const SceneRay& ray) const {
-  if (bricks_.empty()) return scene_->first_fiber(ray);
-  return scene_->first_hit(ray, RayReach::kEverything,
-                           [this](std::uint32_t part, const Ray& local, std::uint32_t) {
-                             return bricks_[part]->first_hit(local);
-                           });
+std::optional<ShellHit> GBufferPass::first_fiber(const SceneRay& ray, FarWay& way) const {
+  const auto pass = [&](std::uint32_t cloth, const ShellInterval& interval) {
+    return far_from_ ? way.pass(cloth, interval) : ClothScene::Passing::kLook;
+  };
+  const auto query = [this](std::uint32_t part, const Ray& local, std::uint32_t own_fiber) {
+    return bricks_.empty() ? scene_->tile(part).intersect(local, own_fiber)
+                           : bricks_[part]->first_hit(local);
+  };
+  return scene_->first_hit(ray, RayReach::kEverything, query, pass);
 }
 
-void GBufferPass::look(const EyeRay& ray, std::uint32_t sample, GBuffer& g_buffer) const {
+void GBufferPass::look(const EyeRay& ray, std::uint32_t sample, float far_draw,
+                       GBuffer& g_buffer) const {
   SceneRay scene_ray{ray.origin, ray.direction};
   const std::optional<MeshHit> mesh = scene_->first_mesh(ray.origin, ray.direction);
   if (mesh) scene_ray.t_max = mesh->t;
-  const std::optional<ShellHit> hit = first_fiber(scene_ray);
+  FarWay way(*scene_, packs_, far_from_.value_or(0), ray, far_draw);
+  const std::optional<ShellHit> hit = first_fiber(scene_ray, way);
   const Vec3 wo = -ray.direction;
-  g_buffer.covered[sample] = hit || mesh ? 1 : 0;
+  for (const FarWay::Stop& stop : way.stops())
+    g_buffer.far.push_back({sample, stop.hit, stop.wo, stop.weight});
+  g_buffer.covered[sample] = hit || mesh ? 1 : 1 - way.left();
+  if (!(way.left() > 0)) return;
   if (hit) {
     const FabricPack& pack = *packs_[hit->part];
     const ShadingPoint point{
@@ -62,16 +74,16 @@ void GBufferPass::look(const EyeRay& ray, std::uint32_t sample, GBuffer& g_buffe
         pack.exemplar.segment_material(hit->segment),
         {scene_->world_tangent(*hit), pack.exemplar.segment_tangent(hit->segment)},
         {wo, scene_->fabric_direction(*hit, wo)}};
-    g_buffer.fibers.push_back({sample, *hit, point});
+    g_buffer.fibers.push_back({sample, *hit, point, way.left()});
   } else if (mesh && mesh->surface != nullptr) {
     g_buffer.surfaces.push_back(
         {sample, mesh->mesh,
          mesh->surface->hit(mesh->triangle, mesh->u, mesh->v, ray.direction, ray.spread * mesh->t),
-         wo});
+         wo, way.left()});
   } else if (mesh) {
     g_buffer.meshes.push_back({sample,
                                mesh->mesh - static_cast<std::uint32_t>(scene_->surfaces().size()),
-                               ray.origin + mesh->t * ray.direction.cast<double>()});
+                               ray.origin + mesh->t * ray.direction.cast<double>(), way.left()});
   }
 }
 
@@ -91,8 +103,8 @@ void keep_first_samples(FrameBuffers& frame) {
   frame.tangent.assign(count, Vec3::Zero());
 }
 
-void store_first_samples(const GBuffer& g_buffer, const Camera& camera, const PixelRect& crop,
-                         FrameBuffers& frame) {
+void store_first_samples(const ClothScene& scene, const GBuffer& g_buffer, const Camera& camera,
+                         const PixelRect& crop, FrameBuffers& frame) {
   const auto store = [&](std::uint32_t sample, std::uint32_t segment, std::uint32_t cell,
                          const Vec3d& world, const Vec3& fabric, const Vec3& tangent) {
     const int place = static_cast<int>(sample);
@@ -107,6 +119,12 @@ void store_first_samples(const GBuffer& g_buffer, const Camera& camera, const Pi
   for (const SeenFiber& fiber : g_buffer.fibers) {
     store(fiber.sample, fiber.hit.segment, fiber.point.cell, fiber.hit.position,
           fiber.hit.fabric.cast<float>(), fiber.point.tangent.world);
+  }
+  for (const SeenFar& far : g_buffer.far) {
+    // of the weft
+    const Vec3 tangent = scene.shell(far.hit.cloth).world_from_fabric(far.hit.tet).col(0);
+    store(far.sample, kNoSegment, kNoSegment, far.hit.position, far.hit.fabric.cast<float>(),
+          tangent.normalized());
   }
   for (const SeenSurface& surface : g_buffer.surfaces) {
     const Vec2& place = surface.hit.point.position_mm;

@@ -23,11 +23,23 @@
 
 namespace heddle {
 
+/// Segment or cell of what is no fiber.
+inline constexpr std::uint32_t kNoSegment = 0xffffffffU;
+
 /// A sample that sees fibers.
 struct SeenFiber {
   std::uint32_t sample;  // which of the block's
   ShellHit hit;
   ShadingPoint point;
+  float weight = 1;  // share of the sample
+};
+
+/// A sample that sees a fabric's far form, in the mean over many fibers.
+struct SeenFar {
+  std::uint32_t sample;  // which of the block's
+  ShellHit hit;          // at the mean height of the fibers seen; of no segment
+  Vec3 wo;               // fabric space
+  float weight;          // share of the sample
 };
 
 /// A sample that sees cloth without fibers.
@@ -35,7 +47,8 @@ struct SeenSurface {
   std::uint32_t sample;   // which of the block's
   std::uint32_t surface;  // of ClothScene::surfaces()
   SurfaceHit hit;
-  Vec3 wo;  // world
+  Vec3 wo;           // world
+  float weight = 1;  // share of the sample
 };
 
 /// A sample that sees a black mesh.
@@ -43,6 +56,7 @@ struct SeenMesh {
   std::uint32_t sample;  // which of the block's
   std::uint32_t mesh;    // as MeshHit::mesh, less ClothScene::surfaces()
   Vec3d position;        // world, mm
+  float weight = 1;      // share of the sample
 };
 
 /// Samples first .. last - 1 of every pixel of `block`: sample k is number first + k % per_pixel()
@@ -52,10 +66,11 @@ struct GBuffer {
   int first = 0;
   int last = 0;
   std::uint64_t frame_width = 0;  // px, of the whole picture
-  // [sample] meets cloth or a mesh
-  std::vector<std::uint8_t> covered;
+  // [sample] share that meets cloth or a mesh
+  std::vector<float> covered;
   // In the order of their samples.
   std::vector<SeenFiber> fibers;
+  std::vector<SeenFar> far;
   std::vector<SeenSurface> surfaces;
   std::vector<SeenMesh> meshes;
 
@@ -71,35 +86,37 @@ struct GBuffer {
 /// Where pixel `pixel` of a block, row by row, lies in a picture of the crop.
 std::size_t place_in_picture(const PixelRect& block, const PixelRect& crop, int pixel);
 
+class FarWay;
+
 class GBufferPass {
  public:
   /// packs: [part of the scene]. bricks: the same, or empty: eye rays then look for the fibers
-  /// themselves. The scene and the packs outlive the object.
+  /// themselves. far_from: pixels that cover so many repeats of a fabric see nothing but its far
+  /// form, those of less than half as many nothing of it; no pixel does where empty. The scene and
+  /// the packs outlive the object.
   GBufferPass(const ClothScene& scene, std::vector<const FabricPack*> packs,
-              std::vector<std::shared_ptr<const IdBricks>> bricks, std::uint64_t seed,
-              PixelFilter filter = {});
+              std::vector<std::shared_ptr<const IdBricks>> bricks, std::optional<float> far_from,
+              std::uint64_t seed, PixelFilter filter = {});
 
   GBuffer run(const Camera& camera, const PixelRect& block, int first, int last) const;
 
  private:
-  std::optional<ShellHit> first_fiber(const SceneRay& ray) const;
-  void look(const EyeRay& ray, std::uint32_t sample, GBuffer& g_buffer) const;
+  std::optional<ShellHit> first_fiber(const SceneRay& ray, FarWay& way) const;
+  void look(const EyeRay& ray, std::uint32_t sample, float far_draw, GBuffer& g_buffer) const;
 
   const ClothScene* scene_;
   std::vector<const FabricPack*> packs_;
   std::vector<std::shared_ptr<const IdBricks>> bricks_;
+  std::optional<float> far_from_;
   std::uint64_t seed_;
   PixelFilter filter_;
 };
 
-/// Segment and cell of a pixel that sees no fiber.
-inline constexpr std::uint32_t kNoSegment = 0xffffffffU;
-
 /// Makes room for the layers of each pixel's first sample.
 void keep_first_samples(FrameBuffers& frame);
 /// Writes them for the pixels of the G-buffer, whose samples begin with the first one.
-void store_first_samples(const GBuffer& g_buffer, const Camera& camera, const PixelRect& crop,
-                         FrameBuffers& frame);
+void store_first_samples(const ClothScene& scene, const GBuffer& g_buffer, const Camera& camera,
+                         const PixelRect& crop, FrameBuffers& frame);
 
 }  // namespace heddle
 

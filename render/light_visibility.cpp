@@ -41,27 +41,36 @@ LightVisibilityPass::LightVisibilityPass(const ClothScene& scene, std::vector<Pa
       seed_(seed) {}
 
 LightVisibility LightVisibilityPass::run(const GBuffer& g_buffer) const {
-  const std::size_t count = g_buffer.fibers.size() * lights_.size();
+  const std::size_t count = (g_buffer.fibers.size() + g_buffer.far.size()) * lights_.size();
   LightVisibility result;
   result.lights = lights_.size();
   result.visible.reserve(count);
   if (draw_directions_) result.direction.reserve(count);
-  for (const SeenFiber& fiber : g_buffer.fibers) {
-    const RandomStream draws = g_buffer.random(seed_, RandomStage::kLightVisibility, fiber.sample);
-    RandomStream redraw = g_buffer.random(seed_, RandomStage::kLightRedraw, fiber.sample);
-    for (std::size_t l = 0; l < lights_.size(); ++l) {
-      const Light& light = lights_[l];
-      RandomStream random = draws;
-      random.skip(kDrawsPerLight * l);
-      const LightVisibility::OfLight visible = find(fiber.hit, light, random, redraw);
-      result.visible.push_back(visible);
-      if (!draw_directions_) continue;
-      result.direction.push_back(visible.at_point
-                                     ? sample_light(light, fiber.hit.position, random).direction
-                                     : Vec3(0, 0, 0));
-    }
-  }
+  for (const SeenFiber& fiber : g_buffer.fibers) look(g_buffer, fiber.sample, fiber.hit, result);
+  for (const SeenFar& far : g_buffer.far) look(g_buffer, far.sample, far.hit, result);
   return result;
+}
+
+void LightVisibilityPass::look(const GBuffer& g_buffer, std::uint32_t sample, const ShellHit& hit,
+                               LightVisibility& result) const {
+  const RandomStream draws = g_buffer.random(seed_, RandomStage::kLightVisibility, sample);
+  RandomStream redraw = g_buffer.random(seed_, RandomStage::kLightRedraw, sample);
+  for (std::size_t l = 0; l < lights_.size(); ++l) {
+    const Light& light = lights_[l];
+    RandomStream random = draws;
+    random.skip(kDrawsPerLight * l);
+    const LightVisibility::OfLight visible = find(hit, light, random, redraw);
+    result.visible.push_back(visible);
+    if (!draw_directions_) continue;
+    result.direction.push_back(
+        visible.at_point ? sample_light(light, hit.position, random).direction : Vec3(0, 0, 0));
+  }
+}
+
+void LightVisibilityPass::at(const ShellHit& hit, RandomStream& random,
+                             std::span<LightVisibility::OfLight> visible) const {
+  for (std::size_t l = 0; l < lights_.size(); ++l)
+    visible[l] = find(hit, lights_[l], random, random);
 }
 
 LightVisibility::OfLight LightVisibilityPass::find(const ShellHit& hit, const Light& light,

@@ -1,8 +1,8 @@
 #ifndef HEDDLE_RENDER_LIGHT_VISIBILITY_H_
 #define HEDDLE_RENDER_LIGHT_VISIBILITY_H_
-// Second pass of the precomputed methods: which lights reach what a G-buffer holds of fibers, past
-// shells (as solids) and meshes. Shadows between fibers are not its matter. It knows where lights
-// are and how wide, not how bright.
+// Second pass of the precomputed methods: which lights reach what a G-buffer holds of fibers and
+// far forms, past shells (as solids) and meshes. Shadows between fibers are not its matter. It
+// knows where lights are and how wide, not how bright.
 //
 // Two shadow rays for each light. The first starts on the shell's surface straight above the hit,
 // or below it where the light is under the cloth; it serves single scattering. The second starts
@@ -32,13 +32,13 @@ struct LightVisibility {
     bool nearby = false;  // at the point moved along the cloth
   };
   std::size_t lights = 0;
-  std::vector<OfLight> visible;  // [GBuffer::fibers][light]
+  std::vector<OfLight> visible;  // [GBuffer::fibers, then GBuffer::far][light]
   // [GBuffer::fibers][light] drawn from the light, for methods that take all of it from there; set
   // where the light is visible at the point. Empty for other methods.
   std::vector<Vec3> direction;
 
-  const OfLight& of(std::size_t fiber, std::size_t light) const {
-    return visible[fiber * lights + light];
+  const OfLight& of(std::size_t seen, std::size_t light) const {
+    return visible[seen * lights + light];
   }
 };
 
@@ -55,8 +55,14 @@ class LightVisibilityPass {
                       std::span<const Light> lights, bool draw_directions, std::uint64_t seed);
 
   LightVisibility run(const GBuffer& g_buffer) const;
+  /// What reaches one place: visible [light].
+  void at(const ShellHit& hit, RandomStream& random,
+          std::span<LightVisibility::OfLight> visible) const;
 
  private:
+  /// Appends what reaches one hit.
+  void look(const GBuffer& g_buffer, std::uint32_t sample, const ShellHit& hit,
+            LightVisibility& result) const;
   /// `redraw`: of directions that lie behind the cloth.
   LightVisibility::OfLight find(const ShellHit& hit, const Light& light, RandomStream& random,
                                 RandomStream& redraw) const;

@@ -65,12 +65,14 @@ constexpr std::array<MethodRow, kRenderMethodCount> kRows = {{
      .name = "exact",
      .visibility = kByLight,
      .takes_transfer = true,
+     .has_far_form = true,
      .make_shading = shipped},
     {.method = kVolume,
      .name = "volume",
      .marches_volume = true,
      .visibility = kByLight,
      .takes_transfer = true,
+     .has_far_form = true,
      .make_shading = shipped},
     {.method = kPath, .name = "path", .traces_paths = true},
     {.method = kPath6, .name = "path-6", .traces_paths = true, .max_scatterings = 6},
@@ -153,6 +155,13 @@ Needs needs_of(RenderMethod method, std::span<const Light> lights, const Visibil
       needs.sgs |= blend.uses_lobes(light.sharpness);
     }
   }
+  return needs;
+}
+
+Needs needs_with_far_forms(Needs needs, RenderMethod method, bool in_pixels, int bounces) {
+  if (!method_row(method).has_far_form) return needs;
+  needs.far = in_pixels || bounces > 0;
+  needs.ssdf |= bounces > 0;  // light between folds is a narrow Gaussian
   return needs;
 }
 

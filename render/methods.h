@@ -60,6 +60,7 @@ struct MethodRow {
   bool tells_lobes = true;
   // Takes all of a light from one direction drawn from it (LightVisibility::direction).
   bool draws_light = false;
+  bool has_far_form = false;  // for pixels that cover many repeats
   std::unique_ptr<const FabricShading> (*make_shading)(const ShadingInputs& inputs) = nullptr;
 };
 
@@ -79,6 +80,7 @@ struct Needs {
   bool sgs = false;
   bool transfer = false;
   bool volume = false;
+  bool far = false;          // form
   std::optional<int> order;  // of the transfer; the fabric's where empty
 };
 
@@ -87,6 +89,10 @@ struct Needs {
 /// blend, sums of Gaussians if one is below its upper end. Environments, spheres and rectangles ask
 /// for both: the Gaussians that stand for them may be sharp and soft. The order is left empty.
 Needs needs_of(RenderMethod method, std::span<const Light> lights, const VisibilityBlend& blend);
+
+/// The same, and what far forms ask for: in_pixels, where pixels see them; bounces, of light
+/// between folds. Methods without far forms need neither.
+Needs needs_with_far_forms(Needs needs, RenderMethod method, bool in_pixels, int bounces);
 
 }  // namespace heddle
 

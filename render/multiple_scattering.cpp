@@ -4,27 +4,14 @@
 #include <cmath>
 #include <vector>
 
+#include "fibers/baked/cone_scattering.h"
 #include "fibers/math/hemisphere_dual.h"
-#include "fibers/math/sampling.h"
 #include "fibers/math/sh_rotation.h"
 #include "fibers/math/special_functions.h"
 #include "fibers/math/spherical_gaussian.h"
+#include "fibers/scattering/wo_space.h"
 
 namespace heddle {
-
-Mat3 wo_space(const Vec3& tangent, const Vec3& wo) {
-  // Below this length of wo's part across the tangent, its direction is rounding error. Then any y
-  // will do, since the BCSDF at theta_o = 90 degrees does not depend on it.
-  constexpr float kAlong = 1e-5F;
-  const Vec3 across = wo - wo.dot(tangent) * tangent;
-  const float length = across.norm();
-  const Vec3 y = length > kAlong ? Vec3(across / length) : Vec3(frame_about(tangent).col(1));
-  Mat3 axes;
-  axes.row(0) = tangent;
-  axes.row(1) = y;
-  axes.row(2) = tangent.cross(y);
-  return axes;
-}
 
 namespace {
 
@@ -36,35 +23,6 @@ constexpr int kAzimuths = 64;
 // Lights of this sharpness and softer do without cones; from the second on, they use them alone.
 constexpr float kConesFrom = 8;
 constexpr float kConesAlone = 20;
-
-using TableLanes = BcsdfTable::Lanes;
-using RgbLanes = BcsdfTable::RgbLanes;
-constexpr int kLanes = TableLanes::SizeAtCompileTime;
-constexpr int kAzimuthNodes = 2 * kLanes;
-
-// Points on the circle, and the Fourier series there.
-struct Circle {
-  std::array<float, kAzimuthNodes> cosine;
-  std::array<float, kAzimuthNodes> sine;
-  Eigen::Matrix<float, kAzimuthNodes, ConeTransfer::kAzimuths> harmonics;
-
-  Circle() {
-    for (int n = 0; n < kAzimuthNodes; ++n) {
-      const auto at = static_cast<std::size_t>(n);
-      const float azimuth = 2 * kPif * (static_cast<float>(n) + 0.5F) / kAzimuthNodes;
-      cosine[at] = std::cos(azimuth);
-      sine[at] = std::sin(azimuth);
-      const auto values = azimuth_harmonics(cosine[at], sine[at]);
-      for (int m = 0; m < ConeTransfer::kAzimuths; ++m)
-        harmonics(n, m) = values[static_cast<std::size_t>(m)];
-    }
-  }
-};
-
-const Circle& circle() {
-  static const Circle points;
-  return points;
-}
 
 }  // namespace
 
@@ -184,38 +142,9 @@ Rgb MultipleScattering::outgoing_from_cones(const CellLight& incoming,
                                             std::uint32_t segment, std::uint16_t material,
                                             const Vec3& tangent, const Vec3& wo) const {
   if (!transfer_->cones || !(light.share > 0)) return Rgb::Zero();
-  // Directions on the light's cone about the bundle, in wo-space.
-  const Mat3 bundle = cone_frame(bundle_tangent_[segment]);
-  const Mat3 turn = wo_space(tangent, wo) * bundle.transpose();
-  const float along = std::clamp(axis.dot(bundle_tangent_[segment]), -1.0F, 1.0F);
-  const float across = std::sqrt(1 - along * along);
-  const Circle& points = circle();
-  std::array<TableLanes, 2> theta_i;
-  std::array<TableLanes, 2> cos_turn;
-  for (int n = 0; n < kAzimuthNodes; ++n) {
-    const auto at = static_cast<std::size_t>(n);
-    const Vec3 w = turn * Vec3(along, across * points.cosine[at], across * points.sine[at]);
-    const float from_tangent = std::hypot(w.y(), w.z());
-    theta_i[at / kLanes][n % kLanes] = std::atan2(w.x(), from_tangent);
-    cos_turn[at / kLanes][n % kLanes] = from_tangent > 0 ? w.y() / from_tangent : 1.0F;
-  }
-  const float theta_o = std::asin(std::clamp(wo.dot(tangent), -1.0F, 1.0F));
-
-  using Moments = Eigen::Matrix<float, ConeTransfer::kAzimuths, 3, Eigen::RowMajor>;
-  Rgb sum = Rgb::Zero();
-  for (int width = 0; width < ConeTransfer::kWidths; ++width) {
-    const Eigen::Map<const Moments> moments(incoming.cones.data() +
-                                            width * ConeTransfer::kAzimuths * 3);
-    const Eigen::Matrix<float, kAzimuthNodes, 3> arriving = points.harmonics * moments;
-    const float variance = ConeTransfer::variance_of(width) + light.variance;
-    for (int half = 0; half < 2; ++half) {
-      const RgbLanes lanes = arriving.middleRows<kLanes>(half * kLanes).array();
-      const auto at = static_cast<std::size_t>(half);
-      sum +=
-          materials_[material].blurred_scatter(theta_i[at], cos_turn[at], theta_o, variance, lanes);
-    }
-  }
-  return light.share * (2 * kPif / kAzimuthNodes) * sum;
+  return light.share * scattered_from_cones(incoming.cones.data(), axis, light.variance,
+                                            {bundle_tangent_[segment], tangent, wo},
+                                            materials_[material]);
 }
 
 void MultipleScattering::clear(SummedLight& sum) const {

@@ -21,10 +21,8 @@
 // better, the dual better still (docs/performance.md).
 //
 // A transfer may keep light on cones apart (fibers/baked/cone_transfer.h). It is then taken out of
-// the harmonics and scattered on its own, per light. The Gaussian about the light's cone, widened
-// by the light's own, is multiplied by the fiber's lobes: in closed form in inclination, and by
-// kAzimuthNodes points in azimuth about the bundle. Lights that are soft enough for the harmonics
-// do without (LightShape::OnCones).
+// the harmonics and scattered on its own, per light (fibers/baked/cone_scattering.h). Lights that
+// are soft enough for the harmonics do without (LightShape::OnCones).
 //
 // The shape of a near light changes from point to point. Its projection is interpolated between
 // shapes of a few sharpnesses (LightShapes). The transfer is linear in the light, so near lights
@@ -186,10 +184,6 @@ class LightShapes {
 /// Radiance towards wo from a fiber with this tangent in the field of harmonics up to `order`.
 Rgb outgoing_from_field(int order, const IncomingField& field, const BcsdfTable& bcsdf,
                         const Vec3& tangent, const Vec3& wo);
-
-/// Axes of wo-space as rows: x = tangent, wo = (sin theta_o, cos theta_o, 0). Any y where wo is
-/// along the tangent.
-Mat3 wo_space(const Vec3& tangent, const Vec3& wo);
 
 }  // namespace heddle
 

@@ -4,6 +4,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cassert>
 #include <cmath>
 #include <map>
@@ -25,6 +26,10 @@ constexpr int kBlockSamples = 8;
 /// Blocks between two calls of the progress callback.
 constexpr int kBlocksPerReport = 64;
 
+std::optional<float> far_from_of(const PrecomputedSettings& settings) {
+  return method_row(settings.method).has_far_form ? settings.far_from : std::nullopt;
+}
+
 void require(bool present, bool needed, const FabricPack& pack, const char* what) {
   if (present || !needed) return;
   throw FileError(fmt::format("{}: the pack holds no {}, which this picture needs",
@@ -39,8 +44,15 @@ std::vector<const FabricPack*> checked(std::span<const FabricPack* const> packs,
     require(pack->ssdf.has_value(), needs.ssdf, *pack, "signed distances");
     require(pack->sgs.has_value(), needs.sgs, *pack, "sums of Gaussians");
     require(pack->volume.has_value(), needs.volume, *pack, "volume");
+    require(pack->far.has_value(), needs.far, *pack, "far form");
   }
   return {packs.begin(), packs.end()};
+}
+
+/// What the renderer needs of its packs.
+Needs needs_of_settings(const PrecomputedSettings& settings, std::span<const Light> lights) {
+  return needs_with_far_forms(needs_of(settings.method, lights, settings.blend), settings.method,
+                              settings.far_from.has_value(), settings.bounces);
 }
 
 /// [part]; empty where eye rays do not march through volumes.
@@ -153,15 +165,17 @@ PrecomputedRenderer::PrecomputedRenderer(const ClothScene& scene,
       lights_(fitted_.lights),
       background_(background),
       settings_(settings),
-      packs_(checked(packs, needs_of(settings.method, lights_, settings.blend))),
+      packs_(checked(packs, needs_of_settings(settings, lights_))),
       shapes_(shapes_of(lights_, method_row(settings.method))),
       near_shapes_(projection_of(method_row(settings.method))),
       shadings_(make_shadings()),
       own_scatterings_(own_scatterings_of(scene, packs_)),
-      g_buffer_pass_(scene, packs_, bricks_of(packs, method_row(settings.method)), settings.seed,
-                     settings.filter),
+      g_buffer_pass_(scene, packs_, bricks_of(packs, method_row(settings.method)),
+                     far_from_of(settings), settings.seed, settings.filter),
       visibility_pass_(scene, visibility_parts(scene, packs, settings.shadow_sigma_mm), lights_,
-                       method_row(settings.method).draws_light, settings.seed) {}
+                       method_row(settings.method).draws_light, settings.seed),
+      far_shading_(scene, settings.far_forms, lights_, shapes_, near_shapes_),
+      fold_light_(scene, packs_, far_shading_, visibility_pass_, lights_.size()) {}
 
 std::vector<std::shared_ptr<const FabricShading>> PrecomputedRenderer::make_shadings() const {
   const MethodRow& method = method_row(settings_.method);
@@ -192,13 +206,14 @@ std::vector<EyeSample> PrecomputedRenderer::shade(const GBuffer& g_buffer,
                                                   const LightVisibility& visibility) const {
   std::vector<EyeSample> seen(g_buffer.sample_count());
   for (std::size_t sample = 0; sample < seen.size(); ++sample) {
-    seen[sample].alpha = static_cast<float>(g_buffer.covered[sample]);
-    if (g_buffer.covered[sample] == 0) seen[sample].background = background_;
+    seen[sample].alpha = g_buffer.covered[sample];
+    if (g_buffer.covered[sample] < 1)
+      seen[sample].background = (1 - g_buffer.covered[sample]) * background_;
   }
   for (const SeenSurface& surface : g_buffer.surfaces) {
     RandomStream random =
         g_buffer.random(settings_.seed, RandomStage::kLightVisibility, surface.sample);
-    seen[surface.sample].single = surface_light(surface, random);
+    seen[surface.sample].single += surface.weight * surface_light(surface, random);
   }
   const std::vector<std::uint32_t> order = shading_order(g_buffer);
   const auto part_of = [&](std::uint32_t k) { return g_buffer.fibers[k].hit.part; };
@@ -209,8 +224,39 @@ std::vector<EyeSample> PrecomputedRenderer::shade(const GBuffer& g_buffer,
     shadings_[part]->shade(g_buffer, visibility, {first, last}, seen);
     first = last;
   }
+  for (const SeenFiber& fiber : g_buffer.fibers) {
+    if (const std::optional<SeenLight> light = fold_light(g_buffer, fiber.sample, fiber.hit)) {
+      seen[fiber.sample].multiple += fiber.weight * shadings_[fiber.hit.part]->under(fiber, *light);
+    }
+  }
   tint_yarns(g_buffer, seen);
+  shade_far(g_buffer, visibility, seen);
   return seen;
+}
+
+void PrecomputedRenderer::shade_far(const GBuffer& g_buffer, const LightVisibility& visibility,
+                                    std::span<EyeSample> seen) const {
+  for (std::size_t k = 0; k < g_buffer.far.size(); ++k) {
+    const SeenFar& far = g_buffer.far[k];
+    const std::size_t first = (g_buffer.fibers.size() + k) * lights_.size();
+    const FarShading::Radiance light = far_shading_.under_lights(
+        far.hit, far.wo, std::span(visibility.visible).subspan(first, lights_.size()));
+    EyeSample& sample = seen[far.sample];
+    sample.single += far.weight * light.single;
+    sample.multiple += far.weight * light.multiple;
+    if (const std::optional<SeenLight> more = fold_light(g_buffer, far.sample, far.hit)) {
+      const FarShading::Radiance sent = far_shading_.under(far.hit, far.wo, *more);
+      sample.multiple += far.weight * (sent.single + sent.multiple);
+    }
+  }
+}
+
+std::optional<SeenLight> PrecomputedRenderer::fold_light(const GBuffer& g_buffer,
+                                                         std::uint32_t sample,
+                                                         const ShellHit& hit) const {
+  if (settings_.bounces == 0 || !method_row(settings_.method).has_far_form) return {};
+  RandomStream random = g_buffer.random(settings_.seed, RandomStage::kFar, sample);
+  return fold_light_.at(hit, settings_.bounces, random);
 }
 
 void PrecomputedRenderer::tint_yarns(const GBuffer& g_buffer, std::span<EyeSample> seen) const {
@@ -290,7 +336,8 @@ class BlockPicture {
         sums_[pixel].add(sum_of_groups(by_group), first + k % (last - first));
         parts_.add(pixel, by_group);
       }
-      if (first == 0) store_first_samples(g_buffer, *camera_, crop_, *frame_);
+      if (first == 0)
+        store_first_samples(by_group_[0]->scene(), g_buffer, *camera_, crop_, *frame_);
     }
     for (int pixel = 0; pixel < block.width * block.height; ++pixel) {
       const std::size_t sum = first_sum + static_cast<std::size_t>(pixel);

@@ -14,12 +14,12 @@
 // sample (surface_cloth.h), whose shadow rays depend on the model too, or from data of their own
 // without noise (interactive_surface.h). A near light acts on each sample as the directional or
 // Gaussian light that stands for it there (lights.h): exact shadows between folds, but parallel
-// light within what surrounds the sample on the cloth. What is not modelled: light between
-// different parts of the cloth, and the shell's bend between two fibers of one cell. Signs of
-// multiple scattering are kept (see multiple_scattering.h): a dark pixel can be slightly negative.
-// Random numbers are addressed by pixel of the full frame and sample, and sums run in sample order:
-// the picture depends neither on threads nor on the crop. Tested in
-// tests/render/precomputed_renderer_test.cpp.
+// light within what surrounds the sample on the cloth. Light between different parts of the cloth
+// is left out, unless the settings ask for it (fold_light.h). What is not modelled: the shell's
+// bend between two fibers of one cell. Signs of multiple scattering are kept (see
+// multiple_scattering.h): a dark pixel can be slightly negative. Random numbers are addressed by
+// pixel of the full frame and sample, and sums run in sample order: the picture depends neither on
+// threads nor on the crop. Tested in tests/render/precomputed_renderer_test.cpp.
 
 #include <cstdint>
 #include <memory>
@@ -31,6 +31,9 @@
 #include "render/camera.h"
 #include "render/cloth_scene.h"
 #include "render/fabric_shading.h"
+#include "render/far_form.h"
+#include "render/far_shading.h"
+#include "render/fold_light.h"
 #include "render/g_buffer.h"
 #include "render/interactive_surface.h"
 #include "render/light_visibility.h"
@@ -52,6 +55,13 @@ struct PrecomputedSettings {
   VisibilityBlend blend;
   // Highest band of the transfer that is used; all of them where absent.
   std::optional<int> transfer_order;
+  // Repeats of a fabric in a pixel from which nothing but its far form is seen (GBufferPass); never
+  // where absent, or where the method has none.
+  std::optional<float> far_from;
+  int bounces = 0;  // of light between folds, where the method has far forms
+  // [part of the scene] of the packs' far forms; needed with either of these. One object serves
+  // many renderers, and keeps what it has built.
+  std::vector<std::shared_ptr<const FarForm>> far_forms;
   // [surface cloth] null, or missing at the end: sampled.
   std::vector<std::shared_ptr<const InteractiveSurface>> interactive;
   PixelFilter filter = {};
@@ -85,8 +95,15 @@ class PrecomputedRenderer {
   /// Pass 3: [sample of the G-buffer].
   std::vector<EyeSample> shade(const GBuffer& g_buffer, const LightVisibility& visibility) const;
 
+  const ClothScene& scene() const { return *scene_; }
+
  private:
   std::vector<std::shared_ptr<const FabricShading>> make_shadings() const;
+  void shade_far(const GBuffer& g_buffer, const LightVisibility& visibility,
+                 std::span<EyeSample> seen) const;
+  /// One draw of the light that other cloth sends to a sample; nothing where it is not asked for.
+  std::optional<SeenLight> fold_light(const GBuffer& g_buffer, std::uint32_t sample,
+                                      const ShellHit& hit) const;
   void tint_yarns(const GBuffer& g_buffer, std::span<EyeSample> seen) const;
   Rgb surface_light(const SeenSurface& surface, RandomStream& random) const;
 
@@ -105,6 +122,8 @@ class PrecomputedRenderer {
   std::vector<std::optional<Rgb>> own_scatterings_;
   GBufferPass g_buffer_pass_;
   LightVisibilityPass visibility_pass_;
+  FarShading far_shading_;
+  FoldLight fold_light_;
 };
 
 /// Beauty, single, multiple, alpha, G-buffer of the first sample. With 2 samples or more also half0

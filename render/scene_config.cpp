@@ -420,6 +420,8 @@ SceneConfig read_scene_config(const TomlTable& document) {
     default_spp = static_cast<int>(render->integer("spp", 1, 1 << 24, default_spp));
     scene.seed = static_cast<std::uint64_t>(render->integer("seed", 0, INT64_MAX, 1));
     scene.shadow_sigma_mm = render->optional_number("shadow_sigma_mm", {0, 1e3});
+    scene.bounces = static_cast<int>(render->integer("bounces", 0, 16, 0));
+    scene.far_from = render->optional_number("far_from", {0, 1e6});
     scene.filter = read_filter(*render);
     scene.layers = read_layers(*render);
   }

@@ -132,6 +132,9 @@ struct SceneConfig {
   std::uint64_t seed = 1;
   // smoothing of global visibility; from the fabric where absent
   std::optional<double> shadow_sigma_mm;
+  // repeats of a fabric in a pixel from which nothing but its far form is seen; none where absent
+  std::optional<double> far_from;
+  int bounces = 0;  // of light between folds, in methods with far forms
   PixelFilter filter;
   LayerChoice layers;
   ScreenLook look;  // of the PNG

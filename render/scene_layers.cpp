@@ -109,8 +109,8 @@ struct PixelLayers {
   Vec3d normal = Vec3d::Zero();
   std::array<std::map<std::uint32_t, double>, kMatteLayers.size()> shown;  // samples, by id
 
-  void show(const Ids& ids) {
-    for (std::size_t k = 0; k < ids.size(); ++k) shown[k][ids[k]] += 1;
+  void show(const Ids& ids, float weight) {
+    for (std::size_t k = 0; k < ids.size(); ++k) shown[k][ids[k]] += static_cast<double>(weight);
   }
 };
 
@@ -128,6 +128,11 @@ class ScenePass {
         frame_(&frame),
         stores_first_(choice.surface && frame.depth.empty()) {
     for (std::uint32_t part = 0; part < scene.part_count(); ++part) {
+      const Exemplar& exemplar = scene.exemplar(part);
+      Rgb albedo = Rgb::Zero();
+      for (const std::uint16_t material : exemplar.material)
+        albedo += fiber_albedo(exemplar.scattering[material]);
+      mean_albedos_.emplace_back(albedo / static_cast<float>(exemplar.fiber_count()));
       if (part > 0 && scene.cloth_of_part(part) == scene.cloth_of_part(part - 1)) continue;
       first_parts_.push_back(part);
       if (choice.mattes)
@@ -173,9 +178,10 @@ class ScenePass {
     return sample / static_cast<std::uint32_t>(seen.per_pixel());
   }
 
-  Vec3d normal_at(const SeenFiber& fiber) const {
-    const Vec3d normal = scene_->surface_point(fiber.hit, ClothSide::kFace).normal;
-    return normal.dot(fiber.point.wo.world.cast<double>()) < 0 ? Vec3d(-normal) : normal;
+  /// Of the cloth, on the side of `wo` (fabric space).
+  Vec3d normal_at(const ShellHit& hit, const Vec3& wo) const {
+    const Vec3d normal = scene_->surface_point(hit, ClothSide::kFace).normal;
+    return wo.z() < 0 ? Vec3d(-normal) : normal;
   }
 
   void add_surface(const GBuffer& seen, std::vector<PixelLayers>& sums) const {
@@ -183,8 +189,13 @@ class ScenePass {
       PixelLayers& sum = sums[pixel_of(seen, fiber.sample)];
       const Exemplar& exemplar = scene_->exemplar(fiber.hit.part);
       const Rgb own = fiber_albedo(exemplar.scattering[fiber.point.material]);
-      sum.albedo += (own * scene_->tint(fiber.hit)).cast<double>();
-      sum.normal += normal_at(fiber);
+      sum.albedo += (fiber.weight * own * scene_->tint(fiber.hit)).cast<double>();
+      sum.normal += fiber.weight * normal_at(fiber.hit, fiber.point.wo.fabric);
+    }
+    for (const SeenFar& far : seen.far) {
+      PixelLayers& sum = sums[pixel_of(seen, far.sample)];
+      sum.albedo += (far.weight * mean_albedos_[far.hit.part]).cast<double>();
+      sum.normal += far.weight * normal_at(far.hit, far.wo);
     }
     for (const SeenSurface& surface : seen.surfaces) {
       PixelLayers& sum = sums[pixel_of(seen, surface.sample)];
@@ -194,35 +205,41 @@ class ScenePass {
       const Vec3 wo =
           (surface.hit.world_from_patch.transpose() * surface.wo.cast<double>()).cast<float>();
       if (const auto drawn = surface.hit.model->sample(surface.hit.point, wo, random))
-        sum.albedo += drawn->weight.cast<double>();
-      sum.normal += surface.hit.world_from_patch.col(2);
+        sum.albedo += (surface.weight * drawn->weight).cast<double>();
+      sum.normal += surface.weight * surface.hit.world_from_patch.col(2);
     }
   }
 
   void add_mattes(const GBuffer& seen, Namer& namer, std::vector<PixelLayers>& sums) const {
     for (const SeenFiber& fiber : seen.fibers)
-      sums[pixel_of(seen, fiber.sample)].show(namer.of(fiber.hit));
+      sums[pixel_of(seen, fiber.sample)].show(namer.of(fiber.hit), fiber.weight);
+    for (const SeenFar& far : seen.far) {
+      sums[pixel_of(seen, far.sample)].show(namer.of_whole(pieces_->cloths[far.hit.cloth].name),
+                                            far.weight);
+    }
     for (const SeenSurface& surface : seen.surfaces) {
       sums[pixel_of(seen, surface.sample)].show(
-          namer.of_whole(pieces_->surfaces[surface.surface].name));
+          namer.of_whole(pieces_->surfaces[surface.surface].name), surface.weight);
     }
     for (const SeenMesh& mesh : seen.meshes)
-      sums[pixel_of(seen, mesh.sample)].show(namer.of_whole(pieces_->meshes[mesh.mesh]));
+      sums[pixel_of(seen, mesh.sample)].show(namer.of_whole(pieces_->meshes[mesh.mesh]),
+                                             mesh.weight);
   }
 
   void store_first(const GBuffer& seen) {
-    if (stores_first_) store_first_samples(seen, *camera_, crop_, *frame_);
+    if (stores_first_) store_first_samples(*scene_, seen, *camera_, crop_, *frame_);
     const auto at = [&](std::uint32_t sample) -> std::optional<std::size_t> {
       if (sample % static_cast<std::uint32_t>(seen.per_pixel()) != 0) return {};
       return place_in_picture(seen.block, crop_, static_cast<int>(pixel_of(seen, sample)));
     };
-    for (const SeenFiber& fiber : seen.fibers) {
-      const std::optional<std::size_t> k = at(fiber.sample);
-      if (!k) continue;
-      frame_->position[*k] = fiber.hit.position.cast<float>();
-      const LayerPiece& piece = pieces_->cloths[fiber.hit.cloth];
-      frame_->uv[*k] = piece.uv(fiber.hit.fabric.head<2>()).cast<float>();
-    }
+    const auto store_hit = [&](std::uint32_t sample, const ShellHit& hit) {
+      const std::optional<std::size_t> k = at(sample);
+      if (!k) return;
+      frame_->position[*k] = hit.position.cast<float>();
+      frame_->uv[*k] = pieces_->cloths[hit.cloth].uv(hit.fabric.head<2>()).cast<float>();
+    };
+    for (const SeenFiber& fiber : seen.fibers) store_hit(fiber.sample, fiber.hit);
+    for (const SeenFar& far : seen.far) store_hit(far.sample, far.hit);
     for (const SeenSurface& surface : seen.surfaces) {
       const std::optional<std::size_t> k = at(surface.sample);
       if (!k) continue;
@@ -257,6 +274,7 @@ class ScenePass {
   FrameBuffers* frame_;
   bool stores_first_;
   std::vector<std::uint32_t> first_parts_;  // [cloth of fibers]
+  std::vector<Rgb> mean_albedos_;           // [part] of its fibers, each alike
   std::vector<YarnTints> yarns_;            // [cloth of fibers] for the numbers of yarns only
   std::array<Names, kMatteLayers.size()> names_;
 };

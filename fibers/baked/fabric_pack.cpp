@@ -23,9 +23,9 @@ constexpr int kFormatVersion = 1;
 constexpr char kChecksumKey[] = "manifest_xxh3_128";
 constexpr std::uintmax_t kMaxManifestBytes = 1 << 20;
 
-constexpr std::array<std::string_view, 5> kKnownFiles = {"fibers.safetensors", "ssdf.safetensors",
-                                                         "sg.safetensors", "transfer.safetensors",
-                                                         "volume.vdb"};
+constexpr std::array<std::string_view, 6> kKnownFiles = {
+    "fibers.safetensors",   "ssdf.safetensors", "sg.safetensors",
+    "transfer.safetensors", "volume.vdb",       "far.safetensors"};
 
 bool is_known_file(std::string_view name) {
   return std::find(kKnownFiles.begin(), kKnownFiles.end(), name) != kKnownFiles.end();
@@ -151,6 +151,13 @@ FabricPack load_pack(const std::filesystem::path& folder) {
     pack.transfer = read_transfer(folder / "transfer.safetensors");
     require_rows(pack.transfer->cell_of_segment.size(), "transfer.safetensors");
     if (pack.transfer->cones) pack.bundle_tangent = bundle_tangents(pack.exemplar);
+  }
+  if (manifest.files.contains("far.safetensors")) {
+    pack.far = read_far_table(folder / "far.safetensors");
+    if (pack.far->both_sides != pack.light_from_both_sides) {
+      throw FileError((folder / "far.safetensors").string() +
+                      ": its light comes from other sides than the pack's");
+    }
   }
   if (manifest.files.contains("volume.vdb")) {
     pack.volume = read_id_volume(folder / "volume.vdb");

@@ -2,8 +2,8 @@
 #define HEDDLE_FIBERS_BAKED_FABRIC_PACK_H_
 // A pack is one folder with everything that a renderer needs of one fabric. Its manifest.json holds
 // the size and the XXH3-128 of every other file, and a checksum of itself. fibers.safetensors is
-// always there. ssdf.safetensors, sg.safetensors, transfer.safetensors and volume.vdb are there if
-// the pack was made with them.
+// always there. ssdf.safetensors, sg.safetensors, transfer.safetensors, volume.vdb and
+// far.safetensors are there if the pack was made with them.
 //
 // Before any file but the manifest is opened, these are checked in order. The first that fails is
 // the message:
@@ -21,6 +21,7 @@
 #include <string_view>
 #include <vector>
 
+#include "fibers/baked/far_table.h"
 #include "fibers/baked/segment_visibility.h"
 #include "fibers/baked/transfer.h"
 #include "fibers/cloth/exemplar.h"
@@ -53,6 +54,7 @@ struct FabricPack {
   std::optional<Transfer> transfer;
   std::vector<Vec3> bundle_tangent;  // [segment], where the transfer has cones
   std::optional<IdVolume> volume;
+  std::optional<FarTable> far;
   std::vector<BcsdfTable> materials;  // [material]
 };
 

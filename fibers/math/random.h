@@ -34,7 +34,7 @@ enum class RandomStage : std::uint32_t {
   kYarnDrift = 14,
   kYarnTint = 15,
   kLightRedraw = 16,
-  kSceneLayers = 21,
+  kFar = 17,
 };
 
 /// SplitMix64 finaliser: a bijection of 64-bit words whose output bits all depend on all input

@@ -419,13 +419,8 @@ BcsdfTable::SgSums BcsdfTable::sg_sums(const Inclination& light, float sharpness
   return sums;
 }
 
-Rgb BcsdfTable::blurred_scatter(const Lanes& theta_i, const Lanes& cos_turn, float theta_o,
-                                float variance, const RgbLanes& light) const {
-  if (fiber_.isotropic_white) {
-    // S = 1 / pi^2, and the mean of the cosine over the Gaussian.
-    const Lanes response = theta_i.cos() * (std::exp(-0.5F * variance) / (kPif * kPif));
-    return (light.colwise() * response).colwise().sum().transpose();
-  }
+BcsdfTable::BlurredLobes BcsdfTable::blurred_lobes(const Lanes& theta_i, const Lanes& cos_turn,
+                                                   float theta_o, float variance) const {
   const Lanes from_cone = theta_i + theta_o;
   // Each lobe without its colours: value, and value times Schlick's weight.
   const auto lobe_response = [&](const LongitudinalLobe& lobe, Lanes& schlick) {
@@ -445,11 +440,36 @@ Rgb BcsdfTable::blurred_scatter(const Lanes& theta_i, const Lanes& cos_turn, flo
   Lanes schlick_tt;
   const Lanes r = lobe_response(r_, schlick_r) * (0.5F / kPif);
   const Lanes tt = lobe_response(tt_, schlick_tt) * azimuth_norm_ * (-k_ * (1.0F + cos_turn)).exp();
+  return {r, r * schlick_r, tt * (1.0F - schlick_tt)};
+}
+
+Rgb BcsdfTable::blurred_scatter(const Lanes& theta_i, const Lanes& cos_turn, float theta_o,
+                                float variance, const RgbLanes& light) const {
   const auto sum = [&](const Lanes& weight) -> Rgb {
     return (light.colwise() * weight).colwise().sum().transpose();
   };
-  return color_r_ * sum(r) +
-         (1.0F - color_r_) * (sum(r * schlick_r) + color_tt_ * sum(tt * (1.0F - schlick_tt)));
+  if (fiber_.isotropic_white) {
+    // S = 1 / pi^2, and the mean of the cosine over the Gaussian.
+    return sum(theta_i.cos() * (std::exp(-0.5F * variance) / (kPif * kPif)));
+  }
+  const BlurredLobes lobes = blurred_lobes(theta_i, cos_turn, theta_o, variance);
+  return color_r_ * sum(lobes.r) +
+         (1.0F - color_r_) * (sum(lobes.r_grazing) + color_tt_ * sum(lobes.tt));
+}
+
+BcsdfTable::RgbLanes BcsdfTable::blurred_response(const Lanes& theta_i, const Lanes& cos_turn,
+                                                  float theta_o, float variance) const {
+  RgbLanes response;
+  if (fiber_.isotropic_white) {
+    response.colwise() = theta_i.cos() * (std::exp(-0.5F * variance) / (kPif * kPif));
+    return response;
+  }
+  const BlurredLobes lobes = blurred_lobes(theta_i, cos_turn, theta_o, variance);
+  for (int c = 0; c < 3; ++c) {
+    response.col(c) =
+        color_r_[c] * lobes.r + (1 - color_r_[c]) * (lobes.r_grazing + color_tt_[c] * lobes.tt);
+  }
+  return response;
 }
 
 void BcsdfTable::sh_coefficients(float theta_o, int order, float* out) const {

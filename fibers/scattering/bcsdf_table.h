@@ -76,6 +76,9 @@ class BcsdfTable {
   /// Gaussians is exact; the factors beside it are taken at its mean.
   Rgb blurred_scatter(const Lanes& theta_i, const Lanes& cos_turn, float theta_o, float variance,
                       const RgbLanes& light) const;
+  /// The same for each lane, under white light of 1.
+  RgbLanes blurred_response(const Lanes& theta_i, const Lanes& cos_turn, float theta_o,
+                            float variance) const;
 
   /// bcsdf_sh by linear interpolation between rows. out: [(order + 1)^2][3], order <= kMaxOrder.
   /// Error 1e-4, but where an end of [-pi/2, pi/2] cuts a narrow lobe: 2e-3 at beta = 1 degree, 0.1
@@ -102,6 +105,15 @@ class BcsdfTable {
   struct SgNodes;
   struct SgSums;
 
+  /// The colours' parts of blurred_response: R, R times Schlick's weight, TT less that; without the
+  /// fiber's colours.
+  struct BlurredLobes {
+    Lanes r;
+    Lanes r_grazing;
+    Lanes tt;
+  };
+  BlurredLobes blurred_lobes(const Lanes& theta_i, const Lanes& cos_turn, float theta_o,
+                             float variance) const;
   static LongitudinalLobe longitudinal_lobe(double beta);
   float probability_of_r(float theta_o, const Rgb& importance) const;
   Densities densities(const Inclination& in, const Inclination& out) const;

@@ -349,8 +349,8 @@ AccuracyTable measure_accuracy(AccuracyData& data, std::uint64_t seed,
   TableMaker maker(
       swatch, 7 + static_cast<std::size_t>(lower_orders) + data.cells.size() + data.voxels.size(),
       progress);
-  const PrecomputedSettings usual{
-      .seed = seed, .shadow_sigma_mm = {}, .blend = {}, .transfer_order = {}, .interactive = {}};
+  PrecomputedSettings usual;
+  usual.seed = seed;
   const auto with = [&](auto&& change) {
     PrecomputedSettings settings = usual;
     change(settings);

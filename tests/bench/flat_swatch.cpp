@@ -51,6 +51,7 @@
 #include "fibers/baked/id_bricks.h"
 #include "fibers/math/random.h"
 #include "fibers/math/sampling.h"
+#include "fibers/scattering/wo_space.h"
 #include "fibers/tracing/path_walk.h"
 #include "fibers/tracing/segment_origins.h"
 #include "fibers/tracing/tile_trace.h"

@@ -11,6 +11,7 @@
 #include "fibers/math/random.h"
 #include "fibers/math/sampling.h"
 #include "fibers/math/spherical_gaussian.h"
+#include "fibers/scattering/wo_space.h"
 #include "tests/support/fibers.h"
 
 namespace heddle {

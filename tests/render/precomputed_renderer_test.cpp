@@ -9,6 +9,7 @@
 
 #include "fibers/math/sampling.h"
 #include "formats/input_error.h"
+#include "precompute/far_bake.h"
 #include "tests/support/fibers.h"
 #include "tests/support/near_lights.h"
 #include "tests/support/pictures.h"
@@ -269,6 +270,125 @@ TEST(PrecomputedRendererLaw, ShadowOfARoofIsHardInSingleAndGaussianInMultipleSca
   EXPECT_LT(worst, 3.5);  // of 32 columns
 }
 
+/// The pack with its far form.
+FabricPack with_far_form(FabricPack pack) {
+  const TileScene tile(pack.exemplar);
+  FarSettings settings;
+  settings.resolution = 24;
+  settings.rays = 512;
+  pack.far = bake_far({&tile, &*pack.ssdf, &*pack.transfer, {}, pack.materials, 0.22}, settings,
+                      [](double) {});
+  return pack;
+}
+
+Rgbd mean_of_layer(const std::vector<Rgb>& layer) {
+  Rgbd sum = Rgbd::Zero();
+  for (const Rgb& value : layer) sum += value.cast<double>();
+  return sum / static_cast<double>(layer.size());
+}
+
+TEST(PrecomputedRendererLaw, FarFormHasTheMeanOfTheFibers) {
+  const Camera camera = camera_above(1.5, 16, 12);
+  for (const Light& light : {gaussian({0.5F, 0.3F, 1}, 150, 1), gaussian({-0.9F, 0.1F, 1}, 40, 1),
+                             directional({0.2F, 0.3F, 1}, 1)}) {
+    const auto world = make_world(with_far_form(open_pack(test_cotton())), {light}, {half_roof()});
+    PrecomputedSettings settings;
+    settings.blend = kSignedDistanceOnly;
+    settings.far_forms = {std::make_shared<const FarForm>(*world->pack.far)};
+    const FrameBuffers exact =
+        shade_picture(world->renderer(settings), camera, {0, 0, 16, 12}, 256, test::no_progress);
+    settings.far_from = 0;
+    const FrameBuffers far =
+        shade_picture(world->renderer(settings), camera, {0, 0, 16, 12}, 16, test::no_progress);
+    const auto error = [](const std::vector<Rgb>& a, const std::vector<Rgb>& b) {
+      return (mean_of_layer(a) / mean_of_layer(b) - 1).abs().maxCoeff();
+    };
+    EXPECT_LT(error(far.single, exact.single), 0.03);
+    EXPECT_LT(error(far.multiple, exact.multiple), 0.03);
+    // Gaps between the fibers show the background.
+    double alpha = 0;
+    for (std::size_t k = 0; k < far.pixel_count(); ++k)
+      alpha += static_cast<double>(far.alpha[k] - exact.alpha[k]);
+    EXPECT_NEAR(alpha / static_cast<double>(far.pixel_count()), 0, 0.02);
+  }
+}
+
+TEST(PrecomputedRenderer, FarFormIsSeenWherePixelsCoverRepeats) {
+  // Pixels are 0.1 mm, a repeat 0.22: below half of far_from all is as it was, to the bit; above
+  // far_from nothing but the far form is seen, which holds no segments.
+  const auto world =
+      make_world(with_far_form(open_pack(test_cotton())), {directional({0, 0, 1}, 1)});
+  const Camera camera = camera_above(1.6, 16, 12);
+  const auto shown = [&](std::optional<float> far_from) {
+    PrecomputedSettings settings;
+    settings.far_from = far_from;
+    settings.far_forms = {std::make_shared<const FarForm>(*world->pack.far)};
+    return shade_picture(world->renderer(settings), camera, {0, 0, 16, 12}, 2, test::no_progress);
+  };
+  const FrameBuffers fibers = shown({});
+  const FrameBuffers near = shown(1.5F);
+  const FrameBuffers far = shown(0.1F);
+  const FrameBuffers between = shown(0.6F);
+  int mixed = 0;
+  for (std::size_t k = 0; k < fibers.pixel_count(); ++k) {
+    EXPECT_TRUE((near.beauty[k] == fibers.beauty[k]).all());
+    EXPECT_EQ(far.segment[k], kNoSegment);
+    mixed += between.segment[k] == kNoSegment;
+  }
+  EXPECT_GT(mixed, 10);
+  EXPECT_LT(mixed, 180);
+}
+
+/// Solid angle of a rectangle from (0, 0) to (a, b) seen from `distance` straight before its
+/// corner.
+double corner_solid_angle(double a, double b, double distance) {
+  return std::atan(a * b / (distance * std::sqrt(a * a + b * b + distance * distance)));
+}
+
+TEST(PrecomputedRendererLaw, FoldsLightEachOther) {
+  // A floor and a wall that faces it. Light grazes the floor from below and shines on the wall
+  // alone. Where fibers show no single scattering and hand on what arrives, radiance is k times the
+  // light from all around, with k = 1 / 2 pi for light from the face. So the floor shows k^2 E
+  // times the solid angle of the wall.
+  FabricPack pack = open_pack(test::white_fiber());
+  std::fill(pack.ssdf->sees_nothing.begin(), pack.ssdf->sees_nothing.end(), std::uint8_t{1});
+  pack = with_far_form(std::move(pack));
+  ClothMesh wall = flat_cloth(2, 4);
+  for (Vec3d& p : wall.positions) p = Vec3d(-0.6 + p.z(), p.y(), 1.1 - p.x());
+  for (Vec3d& n : wall.normals) n = Vec3d(1, 0, 0);
+  const auto tile = std::make_shared<TileScene>(pack.exemplar);
+  std::vector<ClothPiece> pieces;
+  pieces.push_back({tile, flat_cloth(6, 4)});
+  pieces.push_back({tile, wall});
+  const ClothScene scene(std::move(pieces), {});
+  const std::vector<const FabricPack*> packs = {&pack, &pack};
+  const std::vector<Light> lights = {directional({1, 0, -0.02F}, 3)};
+  const auto shown = [&](int bounces) {
+    PrecomputedSettings settings;
+    settings.bounces = bounces;
+    settings.far_forms.assign(2, std::make_shared<const FarForm>(*pack.far));
+    const PrecomputedRenderer renderer(scene, packs, lights, Rgb::Zero(), settings);
+    return mean_of_layer(
+        shade_picture(renderer, camera_above(0.05, 8, 8), {0, 0, 8, 8}, 256, test::no_progress)
+            .multiple)[1];
+  };
+  EXPECT_EQ(shown(0), 0);
+  const double once = shown(1);
+  const double solid_angle =
+      2 * (corner_solid_angle(2, 2.1, 0.6) - corner_solid_angle(2, 0.1, 0.6));
+  EXPECT_NEAR(once / (3 * solid_angle / (4 * kPi * kPi)), 1, 0.08);
+  // The next way that reaches the floor has three bounces: wall, floor, wall.
+  EXPECT_NEAR(shown(2) / once, 1, 0.02);
+  EXPECT_GT(shown(3) / once, 1.02);
+}
+
+TEST(PrecomputedRenderer, APackWithoutFarFormIsRefused) {
+  const auto world = make_world(open_pack(test_cotton()), {directional({0, 0, 1}, 1)});
+  PrecomputedSettings settings;
+  settings.far_from = 1;
+  EXPECT_THROW(world->renderer(settings), FileError);
+}
+
 TEST(PrecomputedRenderer, LightFromBelowLeavesClothLitFromTheFaceDark) {
   for (const bool both_sides : {false, true}) {
     for (const Light& light : {directional({0.1F, 0, -1}, 1), gaussian({0.1F, 0, -1}, 500, 1)}) {
@@ -385,8 +505,8 @@ TEST(PrecomputedRenderer, ALowerOrderIsThatOfDataCutToIt) {
   transfer.standard_error.assign(std::size_t{3} * 3, 0);
   const std::vector<Light> lights = {directional({0.3F, 0.2F, 1}, 1)};
   const auto shown = [](const PackWorld& world, std::optional<int> order) {
-    const PrecomputedSettings settings{
-        .shadow_sigma_mm = {}, .blend = {}, .transfer_order = order, .interactive = {}};
+    PrecomputedSettings settings;
+    settings.transfer_order = order;
     return shade_picture(world.renderer(settings), camera_above(1, 8, 8), {0, 0, 8, 8}, 2,
                          test::no_progress)
         .multiple;

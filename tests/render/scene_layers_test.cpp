@@ -62,7 +62,7 @@ FrameBuffers layers_of(const LayerWorld& world, const Camera& camera, int spp,
                        const SceneLayerChoice& choice = {true, true}) {
   FrameBuffers frame(crop.width, crop.height);
   frame.spp = spp;
-  const GBufferPass pass(*world.scene, {&world.pack}, {}, 3, filter);
+  const GBufferPass pass(*world.scene, {&world.pack}, {}, {}, 3, filter);
   add_scene_layers(
       *world.scene, world.pieces,
       [&](const PixelRect& block, int first, int last) {
