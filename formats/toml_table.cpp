@@ -762,16 +762,20 @@ std::filesystem::path TomlTable::content_file(std::string_view key) const {
   return path;
 }
 
-std::filesystem::path TomlTable::existing_file(std::string_view key) const {
+std::filesystem::path TomlTable::file_name(std::string_view key) const {
   node_->record(key, "file", "", "required");
   const toml::node* value = node_->find(key);
   if (value == nullptr) document_->fail_missing(*node_, key, "the path of a file");
   const auto* text = value->as_string();
   if (text == nullptr) document_->fail_wrong_value(key, *value, "the path of a file");
-  std::filesystem::path path = std::filesystem::path(document_->name).parent_path() / text->get();
+  return std::filesystem::path(document_->name).parent_path() / text->get();
+}
+
+std::filesystem::path TomlTable::existing_file(std::string_view key) const {
+  std::filesystem::path path = file_name(key);
   std::error_code ignored;
   if (!std::filesystem::is_regular_file(path, ignored)) {
-    document_->fail_at(value->source().begin,
+    document_->fail_at(node_->find(key)->source().begin,
                        fmt::format("'{}': there is no file '{}'", key, path.string()));
   }
   return path;

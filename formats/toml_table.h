@@ -79,6 +79,8 @@ class TomlTable {
   std::array<double, 3> color(std::string_view key) const;
   /// A string taken as a path relative to the folder of the document. The file must exist.
   std::filesystem::path existing_file(std::string_view key) const;
+  /// The same for a file that need not exist under this name, as one of many in a sequence.
+  std::filesystem::path file_name(std::string_view key) const;
   /// The same for a file whose content belongs to the config: canonical_text() then holds a hash of
   /// the content in place of the path.
   std::filesystem::path content_file(std::string_view key) const;

@@ -9,12 +9,17 @@
 
 #include "formats/atomic_file.h"
 #include "formats/file_ending.h"
+#include "formats/image_file.h"
 #include "formats/input_error.h"
+#include "formats/numbered_file.h"
 #include "pipeline/accuracy/probe.h"
 #include "pipeline/commands.h"
+#include "pipeline/contact_sheet.h"
+#include "pipeline/interrupt.h"
 #include "pipeline/job.h"
 #include "pipeline/picture_request.h"
 #include "pipeline/plan/scene_plan.h"
+#include "pipeline/render_frames.h"
 #include "pipeline/scene_job.h"
 #include "render/noise_target.h"
 #include "render/render_output.h"
@@ -115,33 +120,96 @@ int render_within(double tolerance, const RenderOptions& options, Job& job) {
   return 0;
 }
 
+/// How many samples it took to make the picture so quiet.
+void say_noise(double noise, const PictureResult& picture, Console& console) {
+  const std::string done =
+      fmt::format("{:.4g} samples per pixel on the mean, noise of the noisiest block {:.3g} %",
+                  picture.mean_samples, 100 * picture.largest_noise);
+  if (picture.largest_noise > noise) {
+    console.warn(done + fmt::format(": {} samples do not make it quieter", kMostSamplesForNoise));
+  } else {
+    console.say(done);
+  }
+}
+
+/// Found out before hours of work.
+void require_frames(const SceneConfig& config, const FrameRange& frames) {
+  SceneConfig scene = config;
+  for (int frame = frames.first; frame <= frames.last; ++frame) show_frame(scene, frame);
+}
+
+void require_picture_writable(const std::filesystem::path& exr) {
+  make_folder(exr.parent_path());
+  for (const char* extension : {".exr", ".png", ".json"})
+    require_writable(std::filesystem::path(exr).replace_extension(extension));
+}
+
+/// One picture per frame, and a contact sheet of all.
+int render_frames(const RenderOptions& options, Job& job) {
+  const FrameRange frames = parse_frames(options.frames);
+  if (options.tolerance) {
+    throw ConfigError(
+        "--frames: not together with --tolerance; `heddle plan --pictures` says which "
+        "method and samples suit a shot");
+  }
+  if (options.resume && options.seconds)
+    throw ConfigError("--resume: not together with --seconds: no two such pictures are alike");
+  const std::filesystem::path pattern = numbered_output(options.output);
+  require_picture_writable(numbered_path(pattern, frames.first));
+  SceneJob scene(options.scene, job.context(),
+                 variant_of_order(options.scene, options.order, frames.first), frames.first);
+  require_frames(scene.config(), frames);
+  std::vector<SheetFrame> sheet;
+  int found = 0;
+  for (int frame = frames.first; frame <= frames.last; ++frame) {
+    stop_if_interrupted();
+    scene.show_frame(frame);
+    PictureRequest request = scene.request_with_layers(find_view(scene.config(), options.view));
+    apply_overrides(options, request);
+    const std::filesystem::path exr = numbered_path(pattern, frame);
+    if (options.resume && is_finished_frame(exr, scene.picture_key(request))) {
+      ++found;
+    } else {
+      PictureResult picture = scene.render(request, fmt::format("frame {}", frame));
+      if (options.noise) say_noise(*options.noise, picture, job.console());
+      picture.image.metadata["heddle.frame"] = fmt::format("{}", frame);
+      // No report of another picture beside the new one, should that be all there is time for.
+      std::filesystem::remove(std::filesystem::path(exr).replace_extension(".json"));
+      write_picture(exr, picture, picture_report(picture), scene.config().look);
+      job.console().say(fmt::format("frame {} of {}-{} in {}", frame, frames.first, frames.last,
+                                    duration_text(picture.time.seconds)));
+    }
+    job.add_artifact(exr);
+    sheet.push_back({frame, std::filesystem::path(exr).replace_extension(".png")});
+  }
+  if (options.resume) {
+    job.console().say(
+        fmt::format("{} of {} frames were finished before", found, frames.last - frames.first + 1));
+  }
+  const RgbPicture small = contact_sheet(sheet);
+  const std::filesystem::path sheet_file =
+      with_number_as(pattern, "sheet").replace_extension(".png");
+  write_png(sheet_file, small.width, small.height, small.rgb);
+  job.add_artifact(sheet_file);
+  job.finish();
+  return 0;
+}
+
 }  // namespace
 
 int render_command(const RenderOptions& options, const CommonOptions& common) {
   if (lower_case_ending(options.output) != ".exr")
     throw ConfigError("-o: expected a file name that ends in .exr");
   Job job(common);
-  // Found out now, not after hours of work.
-  make_folder(options.output.parent_path());
-  for (const char* extension : {".exr", ".png", ".json"}) {
-    require_writable(std::filesystem::path(options.output).replace_extension(extension));
-  }
+  if (!options.frames.empty()) return render_frames(options, job);
+  if (options.resume) throw ConfigError("--resume belongs to --frames");
+  require_picture_writable(options.output);  // found out now, not after hours of work
   if (options.tolerance) return render_within(*options.tolerance, options, job);
   SceneJob scene(options.scene, job.context(), variant_of_order(options.scene, options.order));
   PictureRequest request = scene.request_with_layers(find_view(scene.config(), options.view));
   apply_overrides(options, request);
   const PictureResult picture = scene.render(request, "render");
-  if (options.noise) {
-    const std::string done =
-        fmt::format("{:.4g} samples per pixel on the mean, noise of the noisiest block {:.3g} %",
-                    picture.mean_samples, 100 * picture.largest_noise);
-    if (picture.largest_noise > *options.noise) {
-      job.console().warn(done +
-                         fmt::format(": {} samples do not make it quieter", kMostSamplesForNoise));
-    } else {
-      job.console().say(done);
-    }
-  }
+  if (options.noise) say_noise(*options.noise, picture, job.console());
   write_picture(options.output, picture, picture_report(picture), scene.config().look);
   job.add_artifact(options.output);
   job.finish();

@@ -85,8 +85,11 @@ struct RenderOptions {
   std::optional<double> noise;      // at which each block of pixels ends
   std::optional<double> tolerance;  // method, samples and data by a plan
   int pictures = 1;                 // that the plan reckons with
+  std::string frames;               // "first-last"; empty: one picture
+  bool resume = false;              // with frames: those that are finished stay
 };
-/// Status 1 if no way meets the tolerance; then nothing is rendered.
+/// With frames: NAME_0000.exr and so on, and NAME_sheet.png (docs/sequences.md). Status 1 if no way
+/// meets the tolerance; then nothing is rendered.
 int render_command(const RenderOptions& options, const CommonOptions& common);
 
 struct PlanOptions {

@@ -167,6 +167,9 @@ const char* kept_after_signal(const std::string& command) {
       {"run",
        "finished pictures, stages and chunks are kept in the cache, and the same command goes on "
        "from them; a picture that was being rendered is lost"},
+      {"render --frames",
+       "finished frames are kept, and the same command with --resume goes on from them; finished "
+       "stages and chunks of its fabrics are kept in the cache"},
       {"swatch", "the picture is lost; the fibers are kept in the cache"},
       {"synth", kStages},
       {"transfer", kStages},
@@ -264,7 +267,7 @@ void add_catalogue(CLI::App& app, Options& options, Actions& actions) {
 }
 
 void add_render(CLI::App& app, Options& options, Actions& actions) {
-  CLI::App* render = app.add_subcommand("render", "One picture of a scene");
+  CLI::App* render = app.add_subcommand("render", "One picture of a scene, or one per frame");
   RenderOptions& picture = options.render;
   add_building(*render, options);
   add_picture_seed(*render, options);
@@ -274,6 +277,11 @@ void add_render(CLI::App& app, Options& options, Actions& actions) {
                    "The .exr file; a .png and a .json go beside it")
       ->required();
   add_view(*render, picture.view);
+  render->add_option("--frames", picture.frames,
+                     "first-last: one picture per frame, with its number in place of the #### of "
+                     "the output's name, and a contact sheet");
+  render->add_flag("--resume", picture.resume,
+                   "With --frames: keep frames that are finished and would come out the same");
   render->add_option("--method", picture.method, "In place of the scene's")
       ->check(CLI::IsMember(method_names()));
   render->add_option("--spp", picture.spp, "Samples per pixel, in place of the scene's")
@@ -456,7 +464,8 @@ int main_program(int argc, char** argv) {
                                                   static_cast<std::size_t>(options.threads));
   }
   const std::string command = app.get_subcommands().front()->get_name();
-  watch_for_signals(kept_after_signal(command));
+  const bool is_sequence = command == "render" && !options.render.frames.empty();
+  watch_for_signals(kept_after_signal(is_sequence ? "render --frames" : command));
   const int status = actions.at(command)();
   std::cout.flush();
   if (!std::cout) throw FileError("standard output: cannot be written");

@@ -76,6 +76,15 @@ void say_environment(Console& console, const FittedLights& fitted) {
                   100 * fitted.irradiance_error, 100 * fitted.energy_error));
 }
 
+std::vector<fs::path> mesh_files(const SceneConfig& scene) {
+  std::vector<fs::path> files;
+  for (const ClothConfig& cloth : scene.cloths) {
+    if (cloth.mesh) files.push_back(cloth.mesh->path);
+  }
+  for (const MeshConfig& mesh : scene.meshes) files.push_back(mesh.path);
+  return files;
+}
+
 }  // namespace
 
 SceneVariant variant_of_fabrics(const SceneConfig& scene, const SceneVariant::OfFabric& of_each) {
@@ -87,9 +96,11 @@ SceneVariant variant_of_fabrics(const SceneConfig& scene, const SceneVariant::Of
   return variant;
 }
 
-SceneVariant variant_of_order(const fs::path& scene_file, std::optional<int> order) {
+SceneVariant variant_of_order(const fs::path& scene_file, std::optional<int> order,
+                              std::optional<int> frame) {
   if (!order) return {};
-  return variant_of_fabrics(read_scene_config(TomlTable::load(scene_file)), {.order = order});
+  return variant_of_fabrics(read_scene_config(TomlTable::load(scene_file), frame),
+                            {.order = order});
 }
 
 /// Packs and geometry of a scene for one method.
@@ -97,19 +108,21 @@ struct SceneJob::Loaded {
   std::map<fs::path, FabricPack> packs;  // by fabric file
   std::map<fs::path, std::shared_ptr<const TileScene>> tiles;
   std::vector<const FabricPack*> part_packs;  // [part of the scene]
-  std::unique_ptr<ClothScene> scene;
-  std::vector<BcsdfTable> materials;                                   // of the scene
+  std::vector<ClothTiling> tilings;           // [cloth that has a fabric]
+  std::unique_ptr<ClothScene> scene;          // of the frame; null where that has changed
+  std::vector<BcsdfTable> materials;          // of the scene
   std::vector<std::shared_ptr<const FarForm>> far_forms;               // [part], or none
   std::vector<Warning> warnings;                                       // of the packs
   std::vector<std::shared_ptr<const InteractiveSurface>> interactive;  // [surface cloth]
 };
 
-SceneJob::SceneJob(const fs::path& scene_file, StageContext& context, const SceneVariant& variant)
+SceneJob::SceneJob(const fs::path& scene_file, StageContext& context, const SceneVariant& variant,
+                   std::optional<int> frame)
     : context_(&context), variant_(variant) {
   const TomlTable document = TomlTable::load(scene_file);
-  config_ = read_scene_config(document);
+  config_ = read_scene_config(document, frame);
   auto text = nlohmann::json::parse(document.canonical_text());
-  for (const char* key : {"name", "camera", "view", "render", "png"}) text.erase(key);
+  for (const char* key : {"name", "frame", "camera", "view", "render", "png"}) text.erase(key);
   for (auto& cloth : text.at("cloth")) cloth.erase("surface_method");  // part of the key on its own
   scene_text_ = text.dump();
   for (const std::size_t k : variant.stand_ins)
@@ -276,8 +289,8 @@ std::string SceneJob::picture_key(const PictureRequest& request) {
     if (cloth.pattern) values.emplace_back("pattern", content_hash_of_file(cloth.pattern->picture));
   }
   if (is_cut_for_pictures(config_)) {
-    for (const ViewConfig& view : config_.views)
-      values.emplace_back("cut_for", camera_text(view.camera));
+    for (const CameraConfig& camera : cameras_of_cuts(config_))
+      values.emplace_back("cut_for", camera_text(camera));
   }
   for (const std::string& surface : surface_stages().keys())
     values.emplace_back("interactive", surface);
@@ -299,8 +312,28 @@ const SurfaceStages& SceneJob::surface_stages() {
   return *surface_stages_;
 }
 
+void SceneJob::show_frame(int frame) {
+  const std::vector<fs::path> before = mesh_files(config_);
+  heddle::show_frame(config_, frame);
+  if (mesh_files(config_) == before) return;
+  for (auto& [method, loaded] : loaded_) {
+    if (loaded) loaded->scene.reset();
+  }
+  surface_stages_.reset();
+}
+
 const SceneJob::Loaded& SceneJob::loaded_for(RenderMethod method) {
-  if (const auto found = loaded_.find(method); found != loaded_.end()) return *found->second;
+  std::unique_ptr<Loaded>& loaded = loaded_[method];
+  if (!loaded) loaded = load_fabrics(method);
+  if (!loaded->scene) {
+    // cannot be moved: built in place
+    loaded->scene.reset(new ClothScene(make_cloth_scene(config_, loaded->tilings)));
+    if (!traces_paths(method)) loaded->interactive = surface_stages().load(*loaded->scene);
+  }
+  return *loaded;
+}
+
+std::unique_ptr<SceneJob::Loaded> SceneJob::load_fabrics(RenderMethod method) {
   auto loaded = std::make_unique<Loaded>();
   const std::vector<Artifact> artifacts = packs_for(method);
   std::size_t k = 0;
@@ -308,7 +341,6 @@ const SceneJob::Loaded& SceneJob::loaded_for(RenderMethod method) {
     loaded->packs.emplace(file, load_pack(artifacts[k++].path));
     loaded->tiles[file] = std::make_shared<const TileScene>(loaded->packs.at(file).exemplar);
   }
-  std::vector<ClothTiling> tilings;
   std::set<fs::path> seen;
   for (std::size_t cloth = 0; cloth < config_.cloths.size(); ++cloth) {
     std::vector<ClothTiling::Tile> tiles;
@@ -324,13 +356,11 @@ const SceneJob::Loaded& SceneJob::loaded_for(RenderMethod method) {
     }
     if (tiles.empty()) continue;
     if (layouts_[cloth]) {
-      tilings.emplace_back(std::move(tiles), *layouts_[cloth]);
+      loaded->tilings.emplace_back(std::move(tiles), *layouts_[cloth]);
     } else {
-      tilings.emplace_back(tiles.front());
+      loaded->tilings.emplace_back(tiles.front());
     }
   }
-  // cannot be moved: built in place
-  loaded->scene.reset(new ClothScene(make_cloth_scene(config_, tilings)));
   std::map<const FabricPack*, std::shared_ptr<const FarForm>> far_forms;
   for (const FabricPack* pack : loaded->part_packs) {
     if (!pack->far) break;  // all have it, or none
@@ -342,8 +372,7 @@ const SceneJob::Loaded& SceneJob::loaded_for(RenderMethod method) {
     for (Warning& warning : pack_warnings(pack, *loaded->tiles.at(file)))
       loaded->warnings.push_back(std::move(warning));
   }
-  if (!traces_paths(method)) loaded->interactive = surface_stages().load(*loaded->scene);
-  return *loaded_.emplace(method, std::move(loaded)).first->second;
+  return loaded;
 }
 
 /// One of the two renderers, set up for a picture.

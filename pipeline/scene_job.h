@@ -55,7 +55,8 @@ struct SceneVariant {
 /// The same for every fabric of a scene.
 SceneVariant variant_of_fabrics(const SceneConfig& scene, const SceneVariant::OfFabric& of_each);
 /// The scene of a file with this order of the transfer for every fabric; as it is where empty.
-SceneVariant variant_of_order(const std::filesystem::path& scene_file, std::optional<int> order);
+SceneVariant variant_of_order(const std::filesystem::path& scene_file, std::optional<int> order,
+                              std::optional<int> frame = {});
 
 /// One picture of a scene.
 struct PictureRequest {
@@ -96,12 +97,14 @@ nlohmann::ordered_json picture_report(const PictureResult& picture);
 
 class SceneJob {
  public:
-  /// `context` outlives the object.
+  /// `context` outlives the object. `frame`: as of read_scene_config.
   SceneJob(const std::filesystem::path& scene_file, StageContext& context,
-           const SceneVariant& variant = {});
+           const SceneVariant& variant = {}, std::optional<int> frame = {});
   ~SceneJob();
 
   const SceneConfig& config() const { return config_; }
+  /// Goes to a frame. Packs that are loaded stay; shapes are read again.
+  void show_frame(int frame);
   /// The picture that a view of the scene asks for.
   PictureRequest request(const ViewConfig& view) const;
   /// The same with the layers that the scene asks for.
@@ -150,6 +153,7 @@ class SceneJob {
   std::size_t groups_of(const PictureRequest& request) const {
     return request.light_groups ? config_.light_groups.size() : 1;
   }
+  std::unique_ptr<Loaded> load_fabrics(RenderMethod method);
   const SurfaceStages& surface_stages();
   /// Layers of what eye rays see.
   void add_layers(const PictureRequest& request, const Shading& shading, const Camera& camera,

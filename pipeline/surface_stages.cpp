@@ -82,8 +82,7 @@ std::string geometry_text(const SceneConfig& config,
   for (const MeshFile& mesh : config.meshes) meshes.push_back(mesh_text(mesh));
   nlohmann::json text = {{"cloths", cloths}, {"meshes", meshes}};
   if (is_cut_for_pictures(config)) {
-    for (const ViewConfig& view : config.views) {
-      const CameraConfig& camera = view.camera;
+    for (const CameraConfig& camera : cameras_of_cuts(config)) {
       text["views"].push_back({list(camera.position), list(camera.look_at), list(camera.up),
                                camera.fov, camera.fov_axis == FovAxis::kHorizontal, camera.width,
                                camera.height});

@@ -412,7 +412,7 @@ std::vector<Warning> frame_warnings(const PictureSetup& setup, const FrameBuffer
     warnings.push_back({"distance",
                         fmt::format("a pixel covers {:.1f} repeats of the cloth with {} samples",
                                     median(probe.repeats), frame.spp),
-                        noise, "More samples, or a surface model in place of fibers"});
+                        noise, "More samples, far_from = 1, or a surface model"});
   }
   return warnings;
 }

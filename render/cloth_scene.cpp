@@ -133,15 +133,22 @@ bool ClothScene::occluded(const SceneRay& ray) const {
 
 bool ClothScene::globally_visible(const Shell::SurfacePoint& point, const Vec3& direction,
                                   double distance) const {
-  const Vec3 origin = lifted(point).cast<float>();
+  const Vec3 origin = ray_from(point, direction, distance).origin.cast<float>();
   const auto reach = static_cast<float>(distance);
   return !boundary_.occluded(origin, direction, reach) &&
          !meshes_.occluded(origin, direction, reach);
 }
 
+SceneRay ClothScene::ray_from(const Shell::SurfacePoint& point, const Vec3& direction,
+                              double distance) {
+  // Some 30 times the rounding of a float at 300 mm above the surface.
+  constexpr double kLiftMm = 1e-3;
+  return {point.position + kLiftMm * point.normal, direction, nullptr, distance};
+}
+
 bool ClothScene::visible(const Shell::SurfacePoint& point, const Vec3& direction,
                          double distance) const {
-  return !occluded({lifted(point), direction, nullptr, distance});
+  return !occluded(ray_from(point, direction, distance));
 }
 
 double ClothScene::distance_to_cloth(const Vec3d& point) const {
@@ -154,7 +161,9 @@ double ClothScene::distance_to_cloth(const Vec3d& point) const {
     }
   };
   for (const Cloth& cloth : cloths_) look_at(cloth.shell.boundary_mesh());
-  for (const SurfaceCloth& surface : surfaces_) look_at(surface.triangle_mesh());
+  for (const SurfaceCloth& surface : surfaces_) {
+    if (!surface.is_solid()) look_at(surface.triangle_mesh());
+  }
   return std::sqrt(nearest);
 }
 
@@ -190,7 +199,7 @@ std::uint32_t ClothScene::thinned_vertices() const {
 
 ClothScene make_cloth_scene(const SceneConfig& config, std::span<const ClothTiling> tilings) {
   std::vector<Camera> cameras;
-  for (const ViewConfig& view : config.views) cameras.emplace_back(view.camera);
+  for (const CameraConfig& camera : cameras_of_cuts(config)) cameras.emplace_back(camera);
   std::vector<ClothPiece> pieces;
   std::vector<SurfaceCloth> surfaces;
   for (const ClothConfig& cloth : config.cloths) {
@@ -212,7 +221,13 @@ ClothScene make_cloth_scene(const SceneConfig& config, std::span<const ClothTili
     }
   }
   std::vector<TriangleMesh> black;
-  for (const MeshFile& mesh : config.meshes) black.push_back(read_black_mesh(mesh, cameras));
+  for (const MeshConfig& mesh : config.meshes) {
+    if (mesh.paint) {
+      surfaces.emplace_back(mesh.paint, read_solid_mesh(mesh, cameras), true);
+    } else {
+      black.push_back(read_black_mesh(mesh, cameras));
+    }
+  }
   return {std::move(pieces), std::move(black), std::move(surfaces)};
 }
 

@@ -2,8 +2,9 @@
 #define HEDDLE_RENDER_CLOTH_SCENE_H_
 // All cloth and all meshes of a scene in world space (millimetres). It traces rays through the
 // shell maps against the explicit fibers, or against whatever a query finds in fabric space. It
-// also answers macroscopic visibility against shells and meshes. Meshes are surface cloths and
-// black meshes. Fibers see both as black.
+// also answers macroscopic visibility against shells and meshes. Meshes are surface cloths,
+// coloured meshes and black ones. Fibers see them as black, except that traced paths go on from
+// coloured ones.
 //
 // Shells may overlap in space, and a ray visits all of them. Only a ray that starts inside one
 // shell does not see what another shell holds around its very origin. Fabric coordinates are folded
@@ -91,7 +92,9 @@ class ClothScene {
   ClothScene(std::vector<ClothPiece> pieces, std::vector<TriangleMesh> black_meshes,
              std::vector<SurfaceCloth> surfaces = {});
 
+  /// Surface cloths, then coloured meshes.
   std::span<const SurfaceCloth> surfaces() const { return surfaces_; }
+  bool has_solids() const { return !surfaces_.empty() && surfaces_.back().is_solid(); }
   /// Pieces of fibers; all that `cloth` counts below.
   std::size_t cloth_count() const { return cloths_.size(); }
   const Shell& shell(std::uint32_t cloth) const { return cloths_[cloth].shell; }
@@ -155,6 +158,9 @@ class ClothScene {
   /// past all shells (as solids) and meshes?
   bool globally_visible(const Shell::SurfacePoint& point, const Vec3& direction,
                         double distance = std::numeric_limits<double>::infinity()) const;
+  /// A ray that starts just above a point of a mesh.
+  static SceneRay ray_from(const Shell::SurfacePoint& point, const Vec3& direction,
+                           double distance = std::numeric_limits<double>::infinity());
   /// The same past all fibers and meshes.
   bool visible(const Shell::SurfacePoint& point, const Vec3& direction,
                double distance = std::numeric_limits<double>::infinity()) const;
@@ -163,10 +169,6 @@ class ClothScene {
   /// triangle.
   double distance_to_cloth(const Vec3d& point) const;
 
-  /// Where a ray from a surface point starts, a little off the surface.
-  static Vec3d lifted(const Shell::SurfacePoint& point) {
-    return point.position + kLiftMm * point.normal;
-  }
   /// Surface point of the shell straight over (kFace) or under (kBack) a hit.
   Shell::SurfacePoint surface_point(const ShellHit& hit, ClothSide side) const {
     return shell(hit.cloth).surface_point(hit.tet / 3, hit.fabric.head<2>(), side);
@@ -184,6 +186,14 @@ class ClothScene {
   /// A world direction in the fabric space of the hit, unit length.
   Vec3 fabric_direction(const ShellHit& hit, const Vec3& direction) const {
     return (shell(hit.cloth).fabric_from_world(hit.tet) * direction).normalized();
+  }
+  /// The same without the steps between tetrahedra: the frame is turned to the cloth's normal
+  /// there, which is interpolated between vertices.
+  Vec3 smooth_fabric_direction(const ShellHit& hit, const Vec3& direction) const {
+    const Vec3d normal = surface_point(hit, ClothSide::kFace).normal;
+    const Vec3d own = shell(hit.cloth).fabric_from_world(hit.tet).row(2).transpose().cast<double>();
+    const Vec3d turned = Eigen::Quaterniond::FromTwoVectors(normal, own) * direction.cast<double>();
+    return fabric_direction(hit, turned.cast<float>());
   }
   /// Unit tangent of the hit fiber in world space.
   Vec3 world_tangent(const ShellHit& hit) const {
@@ -222,8 +232,6 @@ class ClothScene {
   static LocalRay local_ray(const ShellInterval& interval, const ClothTiling& tiling,
                             bool at_start);
 
-  // Start of shadow rays above a shell or a mesh: some 30 times the rounding of a float at 300 mm.
-  static constexpr double kLiftMm = 1e-3;
   // Shorter intervals are left to the margins of their neighbours.
   static constexpr double kShortestMm = 1e-7;
   static constexpr double kMarginMm = 1e-6;

@@ -38,7 +38,7 @@ void FarShading::add(const Seen& seen, const SeenLight& light,
                      const MultipleScattering::LightShape* shape,
                      const LightVisibility::OfLight& visible, Radiance& sum) const {
   const FarTable& table = seen.form->table();
-  const Vec3 axis = scene_->fabric_direction(*seen.hit, light.axis);
+  const Vec3 axis = scene_->smooth_fabric_direction(*seen.hit, light.axis);
   std::optional<float> sharpness;
   if (!light.is_directional) sharpness = light.sharpness;
   if (visible.at_point)

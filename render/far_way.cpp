@@ -28,10 +28,16 @@ ClothScene::Passing FarWay::pass(std::uint32_t cloth, const ShellInterval& inter
   float weight = left_ * mean(table.coverage);
   if (left_ - weight < kLeast) weight = left_;
   left_ -= weight;
-  stops_.push_back({ShellHit{cloth, part, interval.tet, kNoSegment, t,
-                             ray_->origin + t * ray_->direction.cast<double>().normalized(),
-                             interval.fabric0 + s * (interval.fabric1 - interval.fabric0)},
-                    wo, weight});
+  const ShellHit hit{cloth,
+                     part,
+                     interval.tet,
+                     kNoSegment,
+                     t,
+                     ray_->origin + t * ray_->direction.cast<double>().normalized(),
+                     interval.fabric0 + s * (interval.fabric1 - interval.fabric0)};
+  Vec3 smooth_wo = scene_->smooth_fabric_direction(hit, -ray_->direction);
+  if (smooth_wo.z() * wo.z() < 0) smooth_wo = wo;  // the side that is seen
+  stops_.push_back({hit, smooth_wo, weight});
   return left_ > 0 ? kSkip : kStop;
 }
 

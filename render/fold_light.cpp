@@ -20,8 +20,8 @@ std::optional<SeenLight> FoldLight::at(const ShellHit& hit, int bounces,
     }
   }
   const float density = (both_sides ? 0.25F : 0.5F) / kPif;
-  const EyeRay ray{scene_->lifted(scene_->surface_point(hit, side)), direction};
-  SceneRay scene_ray{ray.origin, direction};
+  SceneRay scene_ray = ClothScene::ray_from(scene_->surface_point(hit, side), direction);
+  const EyeRay ray{scene_ray.origin, direction};
   if (const std::optional<MeshHit> mesh = scene_->first_mesh(ray.origin, direction))
     scene_ray.t_max = mesh->t;
   FarWay way(*scene_, packs_, 0, ray, 0);

@@ -166,6 +166,43 @@ class ControlMeshBuilder {
   double with_normals_ = 0;  // of the faces: how far they agree with the file's normals
 };
 
+/// Corners of faces with normals of their own; no two triangles share any.
+ClothMesh mesh_with_edges(const ObjMesh& obj, double mm_per_unit) {
+  std::vector<Vec3d> areas;  // [triangle]
+  std::map<Place, std::vector<std::size_t>> triangles_at;
+  for (std::size_t t = 0; t < obj.triangles.size(); ++t) {
+    const auto& [a, b, c] = obj.triangles[t];
+    const Vec3d corner = vector_at(obj.positions[a]);
+    areas.push_back(
+        (vector_at(obj.positions[b]) - corner).cross(vector_at(obj.positions[c]) - corner));
+    for (const std::uint32_t v : {a, b, c}) triangles_at[obj.positions[v]].push_back(t);
+  }
+  ClothMesh mesh;
+  for (std::size_t t = 0; t < obj.triangles.size(); ++t) {
+    const auto first = static_cast<std::uint32_t>(mesh.positions.size());
+    mesh.triangles.push_back({first, first + 1, first + 2});
+    for (const std::uint32_t v : obj.triangles[t]) {
+      Vec3d normal = Vec3d::Zero();
+      for (const std::size_t other : triangles_at[obj.positions[v]]) {
+        const double bent = std::cos(kSharpEdge) * areas[other].norm() * areas[t].norm();
+        if (areas[other].dot(areas[t]) >= bent) normal += areas[other];
+      }
+      mesh.positions.emplace_back(mm_per_unit * vector_at(obj.positions[v]));
+      mesh.normals.emplace_back(normal.norm() > 0 ? Vec3d(normal.normalized()) : Vec3d(0, 0, 1));
+    }
+  }
+  return mesh;
+}
+
+/// As the file says.
+ClothMesh mesh_with_normals(const ObjMesh& obj, double mm_per_unit) {
+  ClothMesh mesh;
+  for (const Place& p : obj.positions) mesh.positions.emplace_back(mm_per_unit * vector_at(p));
+  for (const Place& normal : obj.normals) mesh.normals.emplace_back(vector_at(normal));
+  mesh.triangles = obj.triangles;
+  return mesh;
+}
+
 }  // namespace
 
 Mat3d Placement::rotation() const {
@@ -238,6 +275,29 @@ ClothMesh read_cloth_mesh(const MeshFile& file, double uv_size_mm, const FabricP
     for (Eigen::Vector2d& place : mesh.fabric) place = fabric.fabric_of(place);
   }
   return mesh;
+}
+
+ClothMesh read_solid_mesh(const MeshFile& file, std::span<const Camera> cameras) {
+  const ObjMesh obj = read_obj(file.path, {.mm_per_unit = file.mm_per_unit});
+  if (obj.triangles.empty()) throw FileError(file.path.string() + ": the mesh has no faces");
+  const std::vector<std::uint8_t> shown = shown_triangles(file, obj);
+  if (file.is_smooth()) {
+    ClothMesh mesh = smooth_mesh(file, obj, 0, shown, cameras);
+    mesh.fabric.assign(mesh.positions.size(), Eigen::Vector2d::Zero());
+    return mesh;
+  }
+  ClothMesh mesh = obj.normals.empty() ? mesh_with_edges(obj, file.mm_per_unit)
+                                       : mesh_with_normals(obj, file.mm_per_unit);
+  mesh.fabric.assign(mesh.positions.size(), Eigen::Vector2d::Zero());
+  if (!shown.empty()) {
+    std::vector<std::array<std::uint32_t, 3>> triangles;
+    for (std::size_t t = 0; t < shown.size(); ++t) {
+      if (shown[t] != 0) triangles.push_back(mesh.triangles[t]);
+    }
+    mesh.triangles = std::move(triangles);
+    mesh = without_unused_vertices(std::move(mesh));
+  }
+  return placed(std::move(mesh), file.placement);
 }
 
 TriangleMesh read_black_mesh(const MeshFile& file, std::span<const Camera> cameras) {

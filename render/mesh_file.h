@@ -49,6 +49,8 @@ struct FabricPlacement {
 /// An OBJ file as a scene asks for it.
 struct MeshFile {
   std::filesystem::path path;
+  // of a sequence: one file per frame (numbered_file.h), of which `path` is one; else empty
+  std::filesystem::path numbered;
   double mm_per_unit = 1;
   std::string group;      // name of a group or object; empty: all of the file
   std::string name = {};  // in mattes; empty: by its number. Of meshes only: cloths have their own
@@ -75,6 +77,13 @@ ClothMesh read_cloth_mesh(const MeshFile& file, double uv_size_mm, const FabricP
 
 /// The same without a fabric.
 TriangleMesh read_black_mesh(const MeshFile& file, std::span<const Camera> cameras);
+
+/// The same of a coloured mesh: `fabric` is 0 throughout. Its normals are those of the surface
+/// where it is subdivided, else those of the file. Where the file has none, a corner of a face has
+/// the area-weighted mean of the faces about it that are bent by less than kSharpEdge from its own:
+/// a ball is smooth, and a box has edges.
+ClothMesh read_solid_mesh(const MeshFile& file, std::span<const Camera> cameras);
+inline constexpr double kSharpEdge = 40 * kPi / 180;
 
 /// The mesh where it stands.
 ClothMesh placed(ClothMesh mesh, const Placement& placement);

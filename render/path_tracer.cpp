@@ -52,6 +52,11 @@ void PathTracer::trace(const EyeRay& ray, RandomStream& random, std::span<Sample
     if (mesh->surface == nullptr) return;
     const SurfaceHit surface =
         mesh->surface->hit(mesh->triangle, mesh->u, mesh->v, ray.direction, ray.spread * mesh->t);
+    if (mesh->surface->is_solid() && !settings_.local) {
+      walked_light(trace_, walked_from(), ClothTrace::vertex(surface), -ray.direction, random,
+                   by_group);
+      return;
+    }
     for (std::size_t group = 0; group < by_group.size(); ++group) {
       by_group[group].single = surface_direct_light(
           surface, -ray.direction,

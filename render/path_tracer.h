@@ -7,7 +7,8 @@
 //
 // In local pictures, paths end where they leave the shell, but the shadows of all cloth and meshes
 // stay. That is what the precomputed methods claim to match. Surface cloths are lit directly, past
-// the fibers (surface_cloth.h). Random numbers are addressed by (seed, pixel of the full frame,
+// the fibers (surface_cloth.h). Paths go on from coloured meshes, which local pictures show lit
+// directly. Random numbers are addressed by (seed, pixel of the full frame,
 // sample) and sums run in sample order. So a picture depends neither on threads nor on the crop.
 // Tested in tests/render/path_tracer_test.cpp.
 

@@ -279,9 +279,12 @@ Rgb PrecomputedRenderer::surface_light(const SeenSurface& surface, RandomStream&
       return interactive.light(hit, surface.wo, lights_);
     return interactive.light(hit, surface.wo, far_lights_at(lights_, hit.position));
   }
+  const bool is_solid = scene_->surfaces()[surface.surface].is_solid();
   return surface_direct_light(
       hit, surface.wo, scene_lights_, LightEstimator::kCombined, random,
       [&](const Vec3& direction, double distance) {
+        // A ball under a voile is seen through the voile, and so is its light.
+        if (is_solid) return scene_->visible({hit.position, hit.normal}, direction, distance);
         return scene_->globally_visible({hit.position, hit.normal}, direction, distance);
       });
 }

@@ -10,7 +10,8 @@
 // Whoever keeps a G-buffer relights it by passes 2 and 3; where the lights change their brightness
 // only, by pass 3.
 //
-// Surface cloths are lit directly in pass 3, with shadows of the same shells and meshes: by one
+// Coloured meshes are lit directly in pass 3, with shadows of fibers and meshes. Surface cloths are
+// lit directly too, with shadows of shells and meshes: by one
 // sample (surface_cloth.h), whose shadow rays depend on the model too, or from data of their own
 // without noise (interactive_surface.h). A near light acts on each sample as the directional or
 // Gaussian light that stands for it there (lights.h): exact shadows between folds, but parallel

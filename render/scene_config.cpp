@@ -11,6 +11,7 @@
 #include <string_view>
 
 #include "formats/image_file.h"
+#include "formats/numbered_file.h"
 #include "formats/srgb_color.h"
 #include "render/light_config.h"
 #include "render/surface/surface_presets.h"
@@ -91,7 +92,8 @@ ReferenceConfig read_reference(const TomlTable& table, const CameraConfig& camer
 /// [camera] and every [[view]], which holds the same keys and a name.
 ViewConfig read_view(const TomlTable& table, const SceneConfig& scene, int default_spp) {
   ViewConfig view;
-  view.camera = read_camera(table);
+  view.camera_of_frame_0 = view.camera = read_camera(table);
+  view.turn_per_frame = radians(table.number("turntable_deg_per_frame", {-360, 360}, 0.0));
   view.spp = static_cast<int>(table.integer("spp", 1, 1 << 24, default_spp));
   if (traces_paths(scene.method) && view.spp % 2 != 0) {
     table.fail("spp", "expected an even number: the path tracer keeps two half pictures");
@@ -133,7 +135,13 @@ Placement read_placement(const TomlTable& table) {
 
 MeshFile read_mesh(const TomlTable& table) {
   MeshFile mesh;
-  mesh.path = table.existing_file("mesh");
+  mesh.path = table.file_name("mesh");
+  std::error_code ignored;
+  if (is_numbered(mesh.path) && !std::filesystem::is_regular_file(mesh.path, ignored)) {
+    mesh.numbered = mesh.path;
+  } else {
+    mesh.path = table.existing_file("mesh");
+  }
   const std::string unit = table.choice("mesh_unit", {"m", "cm", "mm"});
   mesh.mm_per_unit = unit == "m" ? 1000.0 : (unit == "cm" ? 10.0 : 1.0);
   if (table.has("group")) mesh.group = table.string("group");
@@ -145,6 +153,32 @@ MeshFile read_mesh(const TomlTable& table) {
   mesh.near_vertices = table.choice("subdivide_vertices", {"cage", "near"}, "cage") == "near";
   mesh.placement = read_placement(table);
   mesh.table = table;
+  return mesh;
+}
+
+Rgbd color_of(const TomlTable& table, const char* key) {
+  const std::array<double, 3> values = table.color(key);
+  return {values[0], values[1], values[2]};
+}
+
+MeshConfig read_solid(const TomlTable& table) {
+  MeshConfig mesh{read_mesh(table), nullptr};
+  const char* const of_gloss[] = {"roughness", "reflectance"};
+  if (!table.has("color")) {
+    for (const char* key : of_gloss) {
+      if (table.has(key)) table.fail(key, "expected color beside it: without, the mesh is black");
+    }
+    return mesh;
+  }
+  PaintConfig paint;
+  paint.color = color_of(table, "color");
+  paint.roughness = table.optional_number("roughness", {PaintConfig::kLeastRoughness, 1});
+  if (table.has("reflectance")) {
+    if (!paint.roughness)
+      table.fail("reflectance", "expected roughness beside it: without, the mesh has no gloss");
+    paint.reflectance = color_of(table, "reflectance");
+  }
+  mesh.paint = std::make_shared<const Paint>(paint);
   return mesh;
 }
 
@@ -387,6 +421,23 @@ LayerChoice read_layers(const TomlTable& render) {
   return layers;
 }
 
+/// The camera carried about its up, through what it looks at.
+CameraConfig turned(const CameraConfig& camera, double angle) {
+  CameraConfig result = camera;
+  result.position = camera.look_at + Eigen::AngleAxisd(angle, camera.up.normalized()) *
+                                         (camera.position - camera.look_at);
+  return result;
+}
+
+void show_frame_of(MeshFile& mesh, int frame) {
+  if (mesh.numbered.empty()) return;
+  mesh.path = numbered_path(mesh.numbered, frame);
+  std::error_code ignored;
+  if (std::filesystem::is_regular_file(mesh.path, ignored)) return;
+  mesh.table->fail(
+      "mesh", fmt::format("there is no file '{}', which is frame {}", mesh.path.string(), frame));
+}
+
 }  // namespace
 
 std::vector<std::filesystem::path> fabric_files(const ClothConfig& cloth) {
@@ -402,16 +453,44 @@ bool is_cut_for_pictures(const SceneConfig& scene) {
          std::any_of(scene.meshes.begin(), scene.meshes.end(), is_cut);
 }
 
-SceneConfig read_scene_config(const TomlTable& document) {
+std::vector<CameraConfig> cameras_of_cuts(const SceneConfig& scene) {
+  // On a turntable from all around, so that shapes are the same in all frames.
+  constexpr int kAround = 24;
+  std::vector<CameraConfig> cameras;
+  for (const ViewConfig& view : scene.views) {
+    if (view.turn_per_frame == 0) {
+      cameras.push_back(view.camera);
+      continue;
+    }
+    for (int k = 0; k < kAround; ++k)
+      cameras.push_back(turned(view.camera_of_frame_0, 2 * kPi * k / kAround));
+  }
+  return cameras;
+}
+
+void show_frame(SceneConfig& scene, int frame) {
+  scene.frame = frame;
+  for (ClothConfig& cloth : scene.cloths) {
+    if (cloth.mesh) show_frame_of(*cloth.mesh, frame);
+  }
+  for (MeshConfig& mesh : scene.meshes) show_frame_of(mesh, frame);
+  for (ViewConfig& view : scene.views) {
+    if (view.turn_per_frame != 0)
+      view.camera = turned(view.camera_of_frame_0, frame * view.turn_per_frame);
+  }
+}
+
+SceneConfig read_scene_config(const TomlTable& document, std::optional<int> frame) {
   SceneConfig scene;
   scene.name = document.string("name");
+  const auto usual_frame = static_cast<int>(document.integer("frame", 0, kMostFrames, 0));
   scene.background = color(document.number3("background", kLight, std::array<double, 3>{0, 0, 0}));
   read_lights(document, scene);
   if (scene.lights.empty()) document.fail("light", "expected at least one [[light]]");
   for (const TomlTable& table : document.tables("cloth")) scene.cloths.push_back(read_cloth(table));
   if (scene.cloths.empty()) document.fail("cloth", "expected at least one [[cloth]]");
   for (const TomlTable& table : document.tables("mesh")) {
-    scene.meshes.push_back(read_mesh(table));
+    scene.meshes.push_back(read_solid(table));
     scene.meshes.back().name = read_matte_name(table);
   }
   int default_spp = 16;
@@ -437,6 +516,7 @@ SceneConfig read_scene_config(const TomlTable& document) {
     scene.views.back().name = name;
   }
   document.finish();
+  show_frame(scene, frame.value_or(usual_frame));
   return scene;
 }
 

@@ -1,6 +1,6 @@
 #ifndef HEDDLE_RENDER_SCENE_CONFIG_H_
 #define HEDDLE_RENDER_SCENE_CONFIG_H_
-// What a scene TOML says: views, lights, pieces of cloth, black meshes, how to render. Keys, units
+// What a scene TOML says: views, lights, pieces of cloth, other meshes, how to render. Keys, units
 // and ranges: configs/README.md. Lengths in millimetres, angles in radians after parsing. Errors:
 // ConfigError with its place. Tested in tests/render/scene_config_test.cpp.
 
@@ -21,6 +21,7 @@
 #include "render/methods.h"
 #include "render/pixel_filter.h"
 #include "render/surface/microcylinder.h"
+#include "render/surface/paint.h"
 #include "render/surface/surface_model.h"
 #include "render/tone_map.h"
 #include "render/yarn_drift.h"
@@ -91,6 +92,11 @@ struct ClothConfig {
   double thickness = 1;   // relative to the fabric's; fibers only
 };
 
+/// A mesh beside cloth.
+struct MeshConfig : MeshFile {
+  std::shared_ptr<const Paint> paint;  // null: black
+};
+
 /// The fabric files of a cloth: none for a surface, one, or those of its pattern.
 std::vector<std::filesystem::path> fabric_files(const ClothConfig& cloth);
 
@@ -105,7 +111,9 @@ struct ReferenceConfig {
 struct ViewConfig {
   std::string name;  // part of the file's name; empty for the view of [camera]
   CameraConfig camera;
-  int spp = 16;  // samples per pixel; even where paths are traced
+  CameraConfig camera_of_frame_0;
+  double turn_per_frame = 0;  // radians about the camera's up, through look_at
+  int spp = 16;               // samples per pixel; even where paths are traced
   std::optional<ReferenceConfig> reference;
 };
 
@@ -120,6 +128,7 @@ struct LayerChoice {
 
 struct SceneConfig {
   std::string name;
+  int frame = 0;
   std::vector<ViewConfig> views;  // that of [camera] first, then every [[view]]
   std::vector<Light> lights;
   // [Light::group] names; one without a name where no light has a group
@@ -127,7 +136,7 @@ struct SceneConfig {
   std::vector<std::filesystem::path> light_files;  // pictures that the lights were read from
   Rgb background = Rgb(0, 0, 0);  // radiance seen by eye rays that hit nothing; lights nothing
   std::vector<ClothConfig> cloths;
-  std::vector<MeshFile> meshes;  // black
+  std::vector<MeshConfig> meshes;
   RenderMethod method = RenderMethod::kExact;
   std::uint64_t seed = 1;
   // smoothing of global visibility; from the fabric where absent
@@ -142,9 +151,16 @@ struct SceneConfig {
 
 /// Do shapes depend on the cameras (subdivide_px)?
 bool is_cut_for_pictures(const SceneConfig& scene);
+/// The cameras on which they depend: those of all views, in all frames.
+std::vector<CameraConfig> cameras_of_cuts(const SceneConfig& scene);
 
-/// Reads a whole scene document, finish() included.
-SceneConfig read_scene_config(const TomlTable& document);
+/// Reads a whole scene document, finish() included, and shows a frame: that of the key `frame`
+/// where none is chosen.
+SceneConfig read_scene_config(const TomlTable& document, std::optional<int> frame = {});
+
+/// Puts the meshes and cameras of a frame in place. Errors: ConfigError where a numbered mesh lacks
+/// that frame.
+void show_frame(SceneConfig& scene, int frame);
 
 }  // namespace heddle
 

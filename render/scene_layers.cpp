@@ -309,8 +309,14 @@ LayerPieces layer_pieces_of(const SceneConfig& scene) {
     (cloth.surface ? pieces.surfaces : pieces.cloths).push_back(std::move(piece));
   }
   for (std::size_t k = 0; k < scene.meshes.size(); ++k) {
-    const std::string& name = scene.meshes[k].name;
-    pieces.meshes.push_back(name.empty() ? fmt::format("mesh{}", k + 1) : name);
+    const MeshConfig& mesh = scene.meshes[k];
+    const std::string name = mesh.name.empty() ? fmt::format("mesh{}", k + 1) : mesh.name;
+    if (mesh.paint) {
+      pieces.surfaces.push_back(
+          {name, [](const Eigen::Vector2d&) { return Eigen::Vector2d(0, 0); }});
+    } else {
+      pieces.meshes.push_back(name);
+    }
   }
   pieces.meshes.insert(pieces.meshes.end(), undersides.begin(), undersides.end());
   return pieces;

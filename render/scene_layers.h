@@ -35,7 +35,7 @@ struct LayerPiece {
 /// The pieces of a scene in the order of ClothScene.
 struct LayerPieces {
   std::vector<LayerPiece> cloths;    // of fibers
-  std::vector<LayerPiece> surfaces;  // without
+  std::vector<LayerPiece> surfaces;  // without, then coloured meshes, whose UV is 0
   std::vector<std::string> meshes;   // black ones, then undersides
 };
 /// Yarns that lie unevenly (yarn_drift) move the fabric on the mesh; their UV leaves that out.

@@ -32,9 +32,10 @@ Mat3d patch_frame(const Vec3d& tangent, const Vec3d& z) {
 
 }  // namespace
 
-SurfaceCloth::SurfaceCloth(std::shared_ptr<const SurfaceModel> model, ClothMesh mesh)
+SurfaceCloth::SurfaceCloth(std::shared_ptr<const SurfaceModel> model, ClothMesh mesh, bool is_solid)
     : model_(std::move(model)),
       mesh_(std::move(mesh)),
+      is_solid_(is_solid),
       tangents_(mesh_.positions.size(), Vec3d::Zero()),
       bitangents_(mesh_.positions.size(), Vec3d::Zero()) {
   for (const auto& [a, b, c] : mesh_.triangles) {
@@ -103,16 +104,13 @@ SurfaceHit SurfaceCloth::hit(std::uint32_t triangle, double u, double v, const V
   return hit;
 }
 
-Rgb surface_direct_light(const SurfaceHit& hit, const Vec3& wo, std::span<const Light> lights,
+Rgb light_by_shadow_rays(const SurfaceHit& hit, const Vec3& wo, std::span<const Light> lights,
                          LightEstimator estimator, RandomStream& random, const OpenTowards& open) {
   const SurfaceModel& model = *hit.model;
   const Mat3d patch_from_world = hit.world_from_patch.transpose();
   const Vec3d local_out = patch_from_world * wo.cast<double>();
   Rgb sum = Rgb::Zero();
-  bool any_to_meet = false;
   for (const Light& light : lights) {
-    any_to_meet = any_to_meet || !light.is_delta();
-    if (estimator == LightEstimator::kEscapes) continue;
     const LightSample incoming = sample_light(light, hit.position, random);
     const Vec3d local_in = patch_from_world * incoming.direction.cast<double>();
     Rgb value = incoming.weight * model.reflected(hit.point, local_in, local_out).cast<float>();
@@ -123,10 +121,21 @@ Rgb surface_direct_light(const SurfaceHit& hit, const Vec3& wo, std::span<const 
     }
     if (open(incoming.direction, incoming.distance)) sum += value;
   }
+  return sum;
+}
+
+Rgb surface_direct_light(const SurfaceHit& hit, const Vec3& wo, std::span<const Light> lights,
+                         LightEstimator estimator, RandomStream& random, const OpenTowards& open) {
+  Rgb sum = Rgb::Zero();
+  if (estimator != LightEstimator::kEscapes)
+    sum = light_by_shadow_rays(hit, wo, lights, estimator, random, open);
+  const bool any_to_meet = std::any_of(lights.begin(), lights.end(),
+                                       [](const Light& light) { return !light.is_delta(); });
   if (!any_to_meet || estimator == LightEstimator::kShadowRays) return sum;
 
+  const Vec3d local_out = hit.world_from_patch.transpose() * wo.cast<double>();
   const std::optional<SurfaceSample> sample =
-      model.sample(hit.point, local_out.cast<float>(), random);
+      hit.model->sample(hit.point, local_out.cast<float>(), random);
   if (!sample) return sum;
   const Vec3 direction = (hit.world_from_patch * sample->wi.cast<double>()).cast<float>();
   const auto weight = [&](float pdf) {

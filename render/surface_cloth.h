@@ -1,7 +1,8 @@
 #ifndef HEDDLE_RENDER_SURFACE_CLOTH_H_
 #define HEDDLE_RENDER_SURFACE_CLOTH_H_
 // A piece of cloth without fibers: a mesh that a surface model draws, lit directly. Light that
-// other cloth scatters onto it, and light that it scatters on, is left out.
+// other cloth scatters onto it, and light that it scatters on, is left out. A mesh that is no cloth
+// but has a colour (surface/paint.h) is drawn alike; traced paths go on from it.
 //
 // Patch frame of a point (surface_model.h): z = the interpolated normal of the side that is looked
 // at, x = the direction in which u grows, made perpendicular to z, y = z x x. It is right-handed
@@ -41,7 +42,10 @@ struct SurfaceHit {
 
 class SurfaceCloth {
  public:
-  SurfaceCloth(std::shared_ptr<const SurfaceModel> model, ClothMesh mesh);
+  /// is_solid: a coloured mesh, no cloth.
+  SurfaceCloth(std::shared_ptr<const SurfaceModel> model, ClothMesh mesh, bool is_solid = false);
+
+  bool is_solid() const { return is_solid_; }
 
   TriangleMesh triangle_mesh() const;
 
@@ -61,6 +65,7 @@ class SurfaceCloth {
  private:
   std::shared_ptr<const SurfaceModel> model_;
   ClothMesh mesh_;
+  bool is_solid_;
   // [vertex] world direction in which u grows, mean over its triangles
   std::vector<Vec3d> tangents_;
   std::vector<Vec3d> bitangents_;  // [vertex] the same of v
@@ -68,6 +73,10 @@ class SurfaceCloth {
 
 /// Is the hit point open towards a world direction for so many mm?
 using OpenTowards = std::function<bool(const Vec3& direction, double distance)>;
+
+/// The part of that below which shadow rays find, one per light; all of it with kShadowRays.
+Rgb light_by_shadow_rays(const SurfaceHit& hit, const Vec3& wo, std::span<const Light> lights,
+                         LightEstimator estimator, RandomStream& random, const OpenTowards& open);
 
 /// Radiance towards `wo` (world) of light that arrives straight from the lights. It takes one
 /// shadow ray per light. One more, for a direction drawn from the model, stands for all Gaussian

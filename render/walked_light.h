@@ -17,6 +17,7 @@
 #include "fibers/tracing/path_walk.h"
 #include "render/lights.h"
 #include "render/pixel_sums.h"
+#include "render/surface_cloth.h"
 
 namespace heddle {
 
@@ -45,7 +46,8 @@ inline Rgb transmitted_share(const BcsdfTable& all, const BcsdfTable& reflecting
 /// Adds light that leaves `vertex` towards `wo` to by_group[Light::group]; all of it to the only
 /// one, where there is one. A Trace of path_walk.h, which also answers
 /// `position(vertex)`, and `escapes(vertex, direction, distance)`: is the way clear for so many mm?
-/// A Vertex may have `is_end`: the path brings nothing from there.
+/// A Vertex may have `is_end`: the path brings nothing from there; or a `surface`, a SurfaceHit:
+/// it is no fiber.
 template <class Trace>
 void walked_light(const Trace& trace, const WalkedFrom& from, const typename Trace::Vertex& vertex,
                   const Vec3& wo, RandomStream& random, std::span<EyeSample> by_group) {
@@ -65,6 +67,9 @@ void walked_light(const Trace& trace, const WalkedFrom& from, const typename Tra
     }
     sample.single += value;
     if (reflecting.empty()) return;
+    if constexpr (requires { vertex.surface; }) {
+      if (vertex.surface) return;  // surfaces let nothing through
+    }
     const Mat3 to_fiber = frame_about(vertex.tangent).transpose();
     sample.transmitted +=
         value * transmitted_share(materials[vertex.material], reflecting[vertex.material],
@@ -76,6 +81,19 @@ void walked_light(const Trace& trace, const WalkedFrom& from, const typename Tra
       if (at.is_end) return false;
     }
     if (estimator == LightEstimator::kEscapes) return true;
+    if constexpr (requires { at.surface; }) {
+      if (at.surface) {
+        const auto open = [&](const Vec3& direction, double distance) {
+          return trace.escapes(at, direction, distance);
+        };
+        for (const Light& light : lights) {
+          const Rgb value =
+              light_by_shadow_rays(*at.surface, out, std::span(&light, 1), estimator, random, open);
+          add(group_of(light), throughput * value, out, scattering);
+        }
+        return true;
+      }
+    }
     const BcsdfTable& bcsdf = materials[at.material];
     const Vec3 local_out = frame.transpose() * out;
     for (const Light& light : lights) {

@@ -11,6 +11,8 @@
 //   struct Vertex { Vec3 position; Vec3 tangent; std::uint16_t material; ... };
 //   // first hit, own fiber ignored
 //   std::optional<Vertex> next(const Vertex& from, const Vec3& direction) const;
+//   // Only if a Vertex has a `surface`: true where it is no fiber. Nothing if all is absorbed.
+//   std::optional<WalkStep> scatter(const Vertex&, const Vec3& wo, RandomStream&) const;
 // Tested in tests/fibers/tracing/path_walk_test.cpp.
 
 #include <algorithm>
@@ -30,6 +32,14 @@ struct WalkLimits {
   int roulette_from = 6;       // Russian roulette from this scattering event on
 };
 
+/// One scattering event, followed backwards.
+struct WalkStep {
+  Vec3 wi;  // where the light came from, in the space of the Trace
+  Rgb weight;
+  float pdf;           // 1/sr
+  float variance = 0;  // see PathEscape
+};
+
 /// Where a path left the cloth.
 struct PathEscape {
   Vec3 direction;  // towards the light
@@ -47,6 +57,15 @@ struct IgnoreRay {
   void operator()(const Vertex&, const Vec3&, const Rgb&, float, int) const {}
 };
 
+/// Scattering by the fiber at a vertex.
+template <class Vertex>
+WalkStep scatter_by_fiber(std::span<const BcsdfTable> materials, const Vertex& vertex,
+                          const Mat3& frame, const Vec3& wo, const Rgb& throughput,
+                          RandomStream& random) {
+  const auto sample = materials[vertex.material].sample(frame.transpose() * wo, random, throughput);
+  return {frame * sample.wi, sample.weight, sample.pdf, sample.deviation * sample.deviation};
+}
+
 /// Follows the path that arrives at `vertex` and leaves it towards `wo` with the given throughput.
 /// at_vertex(vertex, frame, wo, throughput, n) is called at each vertex before scattering event n =
 /// 1, 2, .... The path ends there if it returns false. frame has the fiber frame's axes as columns
@@ -61,11 +80,21 @@ std::optional<PathEscape> walk_path(const Trace& trace, std::span<const BcsdfTab
   for (int n = 1; n <= limits.max_scatterings; ++n) {
     const Mat3 frame = frame_about(vertex.tangent);
     if (!at_vertex(vertex, frame, wo, throughput, n)) return {};
-    const BcsdfTable& bcsdf = materials[vertex.material];
-    const auto sample = bcsdf.sample(frame.transpose() * wo, random, throughput);
-    throughput *= sample.weight;
+    WalkStep step;
+    if constexpr (requires { vertex.surface; }) {
+      if (vertex.surface) {
+        const std::optional<WalkStep> drawn = trace.scatter(vertex, wo, random);
+        if (!drawn) return {};
+        step = *drawn;
+      } else {
+        step = scatter_by_fiber(materials, vertex, frame, wo, throughput, random);
+      }
+    } else {
+      step = scatter_by_fiber(materials, vertex, frame, wo, throughput, random);
+    }
+    throughput *= step.weight;
     if constexpr (requires { vertex.tint; }) throughput *= vertex.tint;
-    variance += sample.deviation * sample.deviation;
+    variance += step.variance;
     if (n >= limits.roulette_from) {
       const float survival = std::min(1.0F, throughput.maxCoeff());
       if (!(random.uniform() < survival)) return {};
@@ -73,12 +102,11 @@ std::optional<PathEscape> walk_path(const Trace& trace, std::span<const BcsdfTab
     } else if (!(throughput.maxCoeff() > 0)) {
       return {};
     }
-    const Vec3 wi = frame * sample.wi;
-    on_ray(vertex, wi, throughput, sample.pdf, n);
-    std::optional<typename Trace::Vertex> next = trace.next(vertex, wi);
-    if (!next) return PathEscape{wi, throughput, sample.pdf, n, variance};
+    on_ray(vertex, step.wi, throughput, step.pdf, n);
+    std::optional<typename Trace::Vertex> next = trace.next(vertex, step.wi);
+    if (!next) return PathEscape{step.wi, throughput, step.pdf, n, variance};
     vertex = *next;
-    wo = -wi;
+    wo = -step.wi;
   }
   return {};
 }

@@ -25,8 +25,8 @@ double path_samples(const Candidate& path, const Target& target, double pixels) 
   return traced ? static_cast<double>(traced->spp) * pixels * target.pictures : INFINITY;
 }
 
-/// Tables of accuracy know cloth of one fabric.
-void refuse_patterns(const std::filesystem::path& scene_file, const SceneConfig& scene) {
+/// Tables of accuracy know cloth of one fabric, and no light from other things.
+void refuse_what_no_table_knows(const std::filesystem::path& scene_file, const SceneConfig& scene) {
   for (std::size_t k = 0; k < scene.cloths.size(); ++k) {
     if (!scene.cloths[k].pattern) continue;
     throw ConfigError(fmt::format(
@@ -34,12 +34,20 @@ void refuse_patterns(const std::filesystem::path& scene_file, const SceneConfig&
         "method and the samples instead: --method, --spp",
         scene_file.string(), k + 1, scene.cloths[k].pattern->fabrics.size()));
   }
+  for (const MeshConfig& mesh : scene.meshes) {
+    if (!mesh.paint) continue;
+    const std::string message =
+        "a plan knows no light between cloth and coloured meshes. Choose the method and the "
+        "samples instead: --method, --spp";
+    if (mesh.table) mesh.table->fail("color", message);
+    throw ConfigError(scene_file.string() + ": " + message);
+  }
 }
 
 }  // namespace
 
 ScenePlan make_plan(const PlanQuestion& question, StageContext& context) {
-  refuse_patterns(question.scene, read_scene_config(TomlTable::load(question.scene)));
+  refuse_what_no_table_knows(question.scene, read_scene_config(TomlTable::load(question.scene)));
   ScenePlan plan;
   plan.question = question;
   const Target& target = question.target;

@@ -12,6 +12,7 @@
 
 #include "fibers/math/random.h"
 #include "fibers/math/sampling.h"
+#include "formats/input_error.h"
 #include "tests/formats/file_fixture.h"
 
 namespace heddle {
@@ -20,13 +21,13 @@ namespace {
 using Eigen::Vector2d;
 
 /// A wavy sheet of 4 x 4 quads, z up, in two groups of one object: rows below and above the middle.
-std::string sheet_text() {
+std::string sheet_text(double height = 0.3) {
   std::string text = "o shirt\n";
   for (int j = 0; j <= 4; ++j) {
     for (int i = 0; i <= 4; ++i) {
       text += "v " + std::to_string(i) + " " + std::to_string(j) + " " +
-              std::to_string(0.3 * std::sin(i + 2 * j)) + "\nvt " + std::to_string(0.25 * i) + " " +
-              std::to_string(0.25 * j) + "\n";
+              std::to_string(height * std::sin(i + 2 * j)) + "\nvt " + std::to_string(0.25 * i) +
+              " " + std::to_string(0.25 * j) + "\n";
     }
   }
   for (int j = 0; j < 4; ++j) {
@@ -335,6 +336,64 @@ TEST_F(MeshFileTest, TetrahedraOfSubdividedDrapesAreWhole) {
       EXPECT_EQ(shell.flipped_count() > 0, levels == 0);
     }
   }
+}
+
+std::string box_text() {
+  return "o box\nv 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nv 0 0 2\nv 2 0 2\nv 2 2 2\nv 0 2 2\n"
+         "g sides\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\ng lid\nf 5 6 7 8\ng bottom\nf 4 3 2 "
+         "1\n";
+}
+
+// A mesh of no cloth: edges of a box are sharp, a gently bent sheet is smooth.
+TEST_F(MeshFileTest, SolidsAreSmoothUpToTheirEdges) {
+  const ClothMesh box = read_solid_mesh(file(box_text()), {});
+  ASSERT_EQ(box.triangles.size(), 12U);
+  EXPECT_EQ(box.fabric.size(), box.positions.size());
+  for (const auto& [a, b, c] : box.triangles) {
+    const Vec3d face = (box.positions[b] - box.positions[a])
+                           .cross(box.positions[c] - box.positions[a])
+                           .normalized();
+    for (const std::uint32_t v : {a, b, c}) EXPECT_LT((box.normals[v] - face).norm(), 1e-12);
+  }
+  const MeshFile sheet = file(sheet_text(0.05));
+  const ClothMesh solid = read_solid_mesh(sheet, {});
+  const ClothMesh welded = cloth(sheet);
+  std::map<std::array<double, 3>, Vec3d> normal_at;
+  for (std::size_t v = 0; v < welded.positions.size(); ++v) {
+    const Vec3d& p = welded.positions[v];
+    normal_at[{p.x(), p.y(), p.z()}] = welded.normals[v];
+  }
+  for (std::size_t v = 0; v < solid.positions.size(); ++v) {
+    const Vec3d& p = solid.positions[v];
+    EXPECT_LT((solid.normals[v] - normal_at.at({p.x(), p.y(), p.z()})).norm(), 1e-9);
+  }
+}
+
+TEST_F(MeshFileTest, SolidsTakeTheFilesNormalsGroupsAndPlaces) {
+  MeshFile lid = file(box_text());
+  lid.group = "lid";
+  lid.mm_per_unit = 10;
+  lid.placement.rotate = Vec3d(kPi / 2, 0, 0);
+  lid.placement.translate_mm = Vec3d(0, 0, 5);
+  const ClothMesh placed_lid = read_solid_mesh(lid, {});
+  EXPECT_EQ(placed_lid.triangles.size(), 2U);
+  EXPECT_EQ(placed_lid.positions.size(), 6U);
+  for (std::size_t v = 0; v < 6; ++v) {
+    EXPECT_NEAR(placed_lid.positions[v].y(), -20, 1e-9) << "z = 2 has become y = -2";
+    EXPECT_LT((placed_lid.normals[v] - Vec3d(0, -1, 0)).norm(), 1e-9);
+  }
+  const MeshFile tilted = file("v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0.6 0 0.8\nf 1//1 2//1 3//1\n");
+  for (const Vec3d& normal : read_solid_mesh(tilted, {}).normals)
+    EXPECT_LT((normal - Vec3d(0.6, 0, 0.8)).norm(), 1e-6);
+  MeshFile smooth = file(box_text());
+  smooth.subdivide = 3;
+  const ClothMesh round = read_solid_mesh(smooth, {});
+  EXPECT_EQ(round.fabric.size(), round.positions.size());
+  for (std::size_t v = 0; v < round.positions.size(); ++v) {
+    const Vec3d out = round.positions[v] - Vec3d(1, 1, 1);
+    EXPECT_GT(round.normals[v].dot(out.normalized()), 0.9) << "a cube's limit is nearly a ball";
+  }
+  EXPECT_THROW(read_solid_mesh(file("v 0 0 0\n"), {}), FileError);
 }
 
 }  // namespace

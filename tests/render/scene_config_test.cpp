@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <fstream>
 
 #include "formats/image_file.h"
@@ -475,6 +476,65 @@ TEST_F(SceneConfigTest, UnevennessIsOffUnlessAsked) {
                                      "spacing_rms_percent = 4, across_mm = 9, along_mm = 1 }\n"))
                 .find("not below across_mm"),
             std::string::npos);
+}
+
+TEST_F(SceneConfigTest, ColouredMeshes) {
+  const std::string mesh = "mesh_unit = \"cm\"\n";
+  const auto scene = [&](const std::string& keys) { return with(kScene, mesh, mesh + keys); };
+  EXPECT_FALSE(read(kScene).meshes[0].paint);
+  const SceneConfig matte = read(scene("color = \"#ff0000\"\n"));
+  ASSERT_TRUE(matte.meshes[0].paint);
+  EXPECT_EQ(matte.meshes[0].paint->gloss_albedo(0.5)[0], 0);
+  const SceneConfig metal =
+      read(scene("color = [0, 0, 0]\nroughness = 0.1\nreflectance = [0.9, 0.6, 0.2]\n"));
+  EXPECT_NEAR(metal.meshes[0].paint->gloss_albedo(1)[1], 0.6, 0.01);
+  for (const auto& [keys, expected] :
+       {std::pair{"roughness = 0.3\n", "'roughness': expected color beside it"},
+        std::pair{"reflectance = [1, 1, 1]\n", "'reflectance': expected color beside it"},
+        std::pair{"color = [1, 0, 0]\nreflectance = [1, 1, 1]\n",
+                  "'reflectance': expected roughness beside it"},
+        std::pair{"color = [1, 0, 0]\nroughness = 0.01\n", "roughness"},
+        std::pair{"color = [1, 0, 2]\n", "color"}}) {
+    const std::string error = message(scene(keys));
+    EXPECT_NE(error.find("scene.toml:3"), std::string::npos) << error;
+    EXPECT_NE(error.find(expected), std::string::npos) << error;
+  }
+}
+
+TEST_F(SceneConfigTest, FramesOfNumberedMeshesAndTurntables) {
+  for (int frame = 0; frame < 2; ++frame)
+    std::ofstream(folder_ / ("d_0" + std::to_string(frame) + ".obj")) << "v 0 0 0\n";
+  const std::string turning =
+      with(kScene, "fov_deg = 30\n", "fov_deg = 30\nturntable_deg_per_frame = 45\n");
+  SceneConfig scene = read(with(turning, "\"drape.obj\"", "\"d_##.obj\""));
+  EXPECT_EQ(scene.cloths[0].mesh->path.filename(), "d_00.obj");
+  EXPECT_EQ(scene.views[0].camera.position, Vec3d(0, -400, 300));
+  show_frame(scene, 1);
+  EXPECT_EQ(scene.cloths[0].mesh->path.filename(), "d_01.obj");
+  EXPECT_LT(
+      (scene.views[0].camera.position - Vec3d(400 * std::sqrt(0.5), -400 * std::sqrt(0.5), 300))
+          .norm(),
+      1e-9)
+      << "anticlockwise from above, about what it looks at";
+  EXPECT_THROW(show_frame(scene, 2), ConfigError);
+  // Shapes that are cut for pictures are cut for all frames alike.
+  const auto cuts = [&](int frame) {
+    show_frame(scene, frame);
+    return cameras_of_cuts(scene);
+  };
+  EXPECT_EQ(cuts(0).size(), 24U);
+  EXPECT_EQ(cuts(0)[5].position, cuts(1)[5].position);
+  const std::string wrong = message(with(kScene, "\"drape.obj\"", "\"e_##.obj\""));
+  EXPECT_NE(wrong.find("scene.toml:19:"), std::string::npos) << wrong;
+  EXPECT_NE(wrong.find("e_00.obj', which is frame 0"), std::string::npos) << wrong;
+  EXPECT_EQ(read("frame = 1\n" + with(kScene, "\"drape.obj\"", "\"d_##.obj\""))
+                .cloths[0]
+                .mesh->path.filename(),
+            "d_01.obj");
+  // A file of exactly that name is no sequence.
+  std::ofstream(folder_ / "e_##.obj") << "v 0 0 0\n";
+  EXPECT_EQ(read(with(kScene, "\"drape.obj\"", "\"e_##.obj\"")).cloths[0].mesh->path.filename(),
+            "e_##.obj");
 }
 
 }  // namespace
