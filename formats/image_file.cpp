@@ -23,6 +23,7 @@
 #include <cerrno>
 #include <fstream>
 #include <span>
+#include <string_view>
 #include <system_error>
 #include <utility>
 
@@ -107,8 +108,12 @@ class OutputStream : public Imf::OStream {
 };
 
 void write_exr_to(Imf::OStream& stream, const Image& image) {
-  const Imath::Box2i window({0, 0}, {image.width - 1, image.height - 1});
-  Imf::Header header(window, window);
+  const Image::Frame& frame = image.frame;
+  const Imath::Box2i window({frame.x0, frame.y0},
+                            {frame.x0 + image.width - 1, frame.y0 + image.height - 1});
+  const bool is_part = frame.width > 0;
+  Imf::Header header(is_part ? Imath::Box2i({0, 0}, {frame.width - 1, frame.height - 1}) : window,
+                     window);
   header.compression() = Imf::ZIP_COMPRESSION;
   // the default is Rec. 709 with white point D65
   Imf::addChromaticities(header, Imf::Chromaticities());
@@ -330,6 +335,11 @@ Image read_exr_from(const std::filesystem::path& path) {
   image.height = checked.height();
   std::vector<ChannelReader> readers = channel_readers(checked, image);
   const Imath::Box2i window = checked.header().dataWindow();
+  const Imath::Box2i shown = checked.header().displayWindow();
+  if (shown != window) {
+    image.frame = {window.min.x - shown.min.x, window.min.y - shown.min.y,
+                   shown.max.x - shown.min.x + 1, shown.max.y - shown.min.y + 1};
+  }
   for (int row = 0; row < image.height; row += checked.rows_at_once()) {
     const int last = std::min(row + checked.rows_at_once(), image.height) - 1;
     const Imath::Box2i part({window.min.x, window.min.y + row},
@@ -428,8 +438,75 @@ RgbPicture parse_png(std::span<const std::byte> bytes, const std::string& name, 
   return picture;
 }
 
+namespace {
+
+// A PNG is its signature and chunks of length, type, data and checksum; the first one is IHDR.
+constexpr std::size_t kPngSignature = 8;
+constexpr std::size_t kPngHeaderEnd = kPngSignature + 12 + 13;
+
+/// CRC-32 of IEEE 802.3, over a chunk's type and data.
+std::uint32_t png_checksum(std::string_view bytes) {
+  std::uint32_t crc = 0xffffffffU;
+  for (const char byte : bytes) {
+    crc ^= static_cast<std::uint8_t>(byte);
+    for (int bit = 0; bit < 8; ++bit) crc = (crc >> 1U) ^ ((crc & 1U) != 0 ? 0xedb88320U : 0U);
+  }
+  return ~crc;
+}
+
+void append_big_endian(std::string& to, std::uint32_t value) {
+  for (const unsigned shift : {24U, 16U, 8U, 0U})
+    to += static_cast<char>(static_cast<std::uint8_t>(value >> shift));
+}
+
+std::uint32_t big_endian_at(std::string_view bytes, std::size_t at) {
+  std::uint32_t value = 0;
+  for (std::size_t k = 0; k < 4; ++k)
+    value = value << 8U | static_cast<std::uint8_t>(bytes[at + k]);
+  return value;
+}
+
+std::string text_chunks(const std::map<std::string, std::string>& text) {
+  std::string chunks;
+  for (const auto& [keyword, value] : text) {
+    assert(!keyword.empty() && keyword.size() < 80);
+    const std::string body = "tEXt" + keyword + '\0' + value;
+    append_big_endian(chunks, static_cast<std::uint32_t>(body.size() - 4));
+    chunks += body;
+    append_big_endian(chunks, png_checksum(body));
+  }
+  return chunks;
+}
+
+}  // namespace
+
+std::map<std::string, std::string> read_png_text(const std::filesystem::path& path) {
+  read_png_header(path);  // refuses what is no PNG
+  const std::vector<std::byte> file = read_whole_file(path);
+  const std::string_view bytes(reinterpret_cast<const char*>(file.data()), file.size());
+  const auto fail = [&](const char* reason) {
+    throw FileError(fmt::format("{}: cannot read as a PNG image: {}", path.string(), reason));
+  };
+  std::map<std::string, std::string> text;
+  for (std::size_t at = kPngSignature; at < bytes.size();) {
+    if (bytes.size() - at < 12) fail("a chunk passes the end of the file");
+    const std::size_t size = big_endian_at(bytes, at);
+    if (size > bytes.size() - at - 12) fail("a chunk passes the end of the file");
+    const std::string_view body = bytes.substr(at + 4, 4 + size);
+    if (body.starts_with("tEXt")) {
+      if (png_checksum(body) != big_endian_at(bytes, at + 8 + size)) fail("a damaged text");
+      const std::size_t end = body.find('\0', 4);
+      if (end == std::string_view::npos) fail("a text without its keyword");
+      text[std::string(body.substr(4, end - 4))] = std::string(body.substr(end + 1));
+    }
+    at += 12 + size;
+  }
+  return text;
+}
+
 void write_png(const std::filesystem::path& path, int width, int height,
-               const std::vector<std::uint8_t>& rgb) {
+               const std::vector<std::uint8_t>& rgb,
+               const std::map<std::string, std::string>& text) {
   assert(width > 0 && height > 0);
   assert(rgb.size() == 3 * static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
   // This interface of libpng keeps its long jumps inside and returns 0 on an error.
@@ -443,7 +520,11 @@ void write_png(const std::filesystem::path& path, int width, int height,
   if (png_image_write_to_memory(&image, bytes.data(), &size, 0, rgb.data(), 0, nullptr) == 0) {
     throw FileError(fmt::format("{}: cannot write: {}", path.string(), image.message));
   }
-  write_file_atomically(path, std::span<const std::byte>(bytes).first(size));
+  bytes.resize(size);
+  const std::string chunks = text_chunks(text);
+  const auto* begin = reinterpret_cast<const std::byte*>(chunks.data());
+  bytes.insert(bytes.begin() + kPngHeaderEnd, begin, begin + chunks.size());
+  write_file_atomically(path, std::span<const std::byte>(bytes));
 }
 
 }  // namespace heddle

@@ -28,6 +28,15 @@ struct Image {
   // "R", "single.R", "segment", ... ; layers are named LAYER.CHANNEL
   std::map<std::string, ImageChannel> channels;
   std::map<std::string, std::string> metadata;  // string attributes
+  // The frame that the image is a part of, and where in it its upper left pixel lies: OpenEXR's
+  // display window, with its corner as origin. Without a width: the image is all of it.
+  struct Frame {
+    int x0 = 0;
+    int y0 = 0;
+    int width = 0;
+    int height = 0;
+  };
+  Frame frame = {};
 };
 
 /// Pixels along an edge; pictures that are larger are refused.
@@ -58,9 +67,13 @@ RgbPicture read_png(const std::filesystem::path& path, int max_extent);
 /// The same for the bytes of a file; `name` stands for it in messages.
 RgbPicture parse_png(std::span<const std::byte> bytes, const std::string& name, int max_extent);
 
-/// [height][width][3] bytes, written atomically.
+/// [height][width][3] bytes, written atomically. text: keywords (1 to 79 Latin-1 characters) and
+/// what they say, as tEXt chunks.
 void write_png(const std::filesystem::path& path, int width, int height,
-               const std::vector<std::uint8_t>& rgb);
+               const std::vector<std::uint8_t>& rgb,
+               const std::map<std::string, std::string>& text = {});
+/// What the tEXt chunks of a PNG file say, by keyword. Their checksums hold.
+std::map<std::string, std::string> read_png_text(const std::filesystem::path& path);
 
 }  // namespace heddle
 

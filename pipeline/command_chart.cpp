@@ -166,7 +166,7 @@ class ChartMaker {
       spent = spent + picture.time;
     }
     write_png(file(key + ".png"), picture.image.width, picture.image.height,
-              tone_map(layer_of(picture.image, "", key), 0));
+              tone_map(layer_of(picture.image, "", key), {}));
     write_exr(file(key + ".exr"), picture.image);
     Json record = {{"key", key},
                    {"picture", json_of(seal_of_file(file(key + ".exr")))},

@@ -23,6 +23,7 @@
 #include "pipeline/fabric_report.h"
 #include "pipeline/json_file.h"
 #include "pipeline/stages.h"
+#include "render/render_output.h"
 #include "render/scene_config.h"
 
 namespace heddle {
@@ -156,10 +157,19 @@ Report describe_vdb(const fs::path& path) {
 
 Report describe_image(const Image& image) {
   Report report = {{"kind", "picture"}, {"resolution_px", {image.width, image.height}}};
-  for (const auto& [key, value] : image.metadata) report["metadata." + key] = value;
+  for (const auto& [key, value] : image.metadata) {
+    // Names of a matte may be thousands.
+    report["metadata." + key] =
+        key.ends_with("/manifest") && value.size() > 200
+            ? fmt::format("{} names", std::count(value.begin(), value.end(), ':'))
+            : value;
+  }
+  const bool is_ours = image.metadata.contains("heddle.method");
   for (const auto& [name, channel] : image.channels) {
+    const std::string meaning = is_ours ? channel_note(name) : "";
+    const std::string note = meaning.empty() ? "" : "  (" + meaning + ")";
     if (channel.type == ChannelType::kUint) {
-      report["channel." + name] = "UINT";
+      report["channel." + name] = "UINT" + note;
       continue;
     }
     double sum = 0;
@@ -177,18 +187,20 @@ Report describe_image(const Image& image) {
     }
     const double count = static_cast<double>(channel.values.size() - not_finite);
     report["channel." + name] = fmt::format(
-        "{}  mean {:.6g}  min {:.6g}  max {:.6g}{}",
+        "{}  mean {:.6g}  min {:.6g}  max {:.6g}{}{}",
         channel.type == ChannelType::kHalf ? "HALF" : "FLOAT", sum / std::max(count, 1.0), low,
-        high, not_finite > 0 ? fmt::format("  {} values not finite", not_finite) : "");
+        high, not_finite > 0 ? fmt::format("  {} values not finite", not_finite) : "", note);
   }
   return report;
 }
 
 Report describe_png(const fs::path& path) {
   const PngHeader header = read_png_header(path);
-  return {{"kind", "picture for the screen"},
-          {"resolution_px", {header.width, header.height}},
-          {"channels", header.channels}};
+  Report report = {{"kind", "picture for the screen"},
+                   {"resolution_px", {header.width, header.height}},
+                   {"channels", header.channels}};
+  for (const auto& [keyword, text] : read_png_text(path)) report["text." + keyword] = text;
+  return report;
 }
 
 Report describe_chart(const nlohmann::json& chart) {

@@ -87,6 +87,8 @@ int render_within(double tolerance, const RenderOptions& options, Job& job) {
   const Way& way = plan.ways[*plan.chosen];
   SceneJob scene(options.scene, job.context(), way.settings.variant);
   PictureRequest request = plan.request;
+  request.layers = scene.config().layers;
+  request.light_groups = true;
   request.spp = first_samples(way.candidate, tolerance);
   Estimate noise_square;  // of a sample
   int spp = 0;
@@ -110,7 +112,7 @@ int render_within(double tolerance, const RenderOptions& options, Job& job) {
   nlohmann::ordered_json report = picture_report(picture);
   report["plan"] = plan_json(plan);
   report["expected_error"] = error;
-  write_picture(options.output, picture, report);
+  write_picture(options.output, picture, report, scene.config().look);
   job.add_artifact(options.output);
   job.add_entry("plan", report["plan"]);
   job.add_entry("expected_error", error);
@@ -162,7 +164,7 @@ int render_frames(const RenderOptions& options, Job& job) {
   for (int frame = frames.first; frame <= frames.last; ++frame) {
     stop_if_interrupted();
     scene.show_frame(frame);
-    PictureRequest request = scene.request(find_view(scene.config(), options.view));
+    PictureRequest request = scene.request_with_layers(find_view(scene.config(), options.view));
     apply_overrides(options, request);
     const std::filesystem::path exr = numbered_path(pattern, frame);
     if (options.resume && is_finished_frame(exr, scene.picture_key(request))) {
@@ -175,7 +177,7 @@ int render_frames(const RenderOptions& options, Job& job) {
       picture.image.metadata["heddle.frame"] = fmt::format("{}", frame);
       // No report of another picture beside the new one, should that be all there is time for.
       std::filesystem::remove(std::filesystem::path(exr).replace_extension(".json"));
-      write_picture(exr, picture, picture_report(picture));
+      write_picture(exr, picture, picture_report(picture), scene.config().look);
       job.console().say(fmt::format("frame {} of {}-{} in {}", frame, frames.first, frames.last,
                                     duration_text(picture.time.seconds)));
     }
@@ -206,11 +208,11 @@ int render_command(const RenderOptions& options, const CommonOptions& common) {
   require_picture_writable(options.output);  // found out now, not after hours of work
   if (options.tolerance) return render_within(*options.tolerance, options, job);
   SceneJob scene(options.scene, job.context(), variant_of_order(options.scene, options.order));
-  PictureRequest request = scene.request(find_view(scene.config(), options.view));
+  PictureRequest request = scene.request_with_layers(find_view(scene.config(), options.view));
   apply_overrides(options, request);
   const PictureResult picture = scene.render(request, "render");
   if (options.noise) say_noise(*options.noise, picture, job.console());
-  write_picture(options.output, picture, picture_report(picture));
+  write_picture(options.output, picture, picture_report(picture), scene.config().look);
   job.add_artifact(options.output);
   job.finish();
   return 0;

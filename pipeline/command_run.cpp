@@ -32,7 +32,7 @@ void provide_picture(SceneJob& scene, const PictureRequest& request, const fs::p
         folder, context.cache.record(stage.name, stage.key), [&](const fs::path& temporary) {
           const PictureResult picture = scene.render(request, title);
           make_folder(temporary);
-          write_picture(temporary / cached.filename(), picture, picture_report(picture));
+          write_picture(temporary / cached.filename(), picture, picture_report(picture), {});
           return BuildCost{watch.elapsed(), working_threads()};
         });
     result.built = true;
@@ -46,6 +46,10 @@ void provide_picture(SceneJob& scene, const PictureRequest& request, const fs::p
     write_file_atomically(fs::path(target).replace_extension(extension),
                           read_whole_file(fs::path(cached).replace_extension(extension)));
   }
+  // The one in the cache serves any look.
+  const ScreenLook& look = scene.config().look;
+  if (look != ScreenLook{})
+    write_screen_picture(fs::path(target).replace_extension(".png"), read_exr(cached), look);
   context.report(std::move(result));
   job.add_artifact(target);
 }
@@ -84,7 +88,7 @@ int run_command(const RunOptions& options, const CommonOptions& common) {
   for (const ViewConfig& view : scene.config().views) {
     const std::string name = view.name.empty() ? options.scene.stem().string() : view.name;
     const fs::path picture = folder / (name + ".exr");
-    provide_picture(scene, scene.request(view), picture, job);
+    provide_picture(scene, scene.request_with_layers(view), picture, job);
     if (!view.reference) continue;
     const fs::path reference = folder / (name + "-reference.exr");
     provide_picture(scene, scene.reference_request(view), reference, job);

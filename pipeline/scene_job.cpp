@@ -18,6 +18,7 @@
 #include "render/noise_target.h"
 #include "render/precomputed_renderer.h"
 #include "render/render_output.h"
+#include "render/scene_layers.h"
 #include "render/tone_map.h"
 
 namespace heddle {
@@ -58,6 +59,7 @@ PathTracerSettings path_tracer_settings(const PictureRequest& request) {
   settings.seed = request.seed;
   settings.local = request.local;
   settings.estimator = request.estimator;
+  settings.filter = request.filter;
   if (const std::optional<int> most = method_row(request.method).max_scatterings)
     settings.limits.max_scatterings = *most;
   if (request.bounces) settings.limits.max_scatterings = *request.bounces;
@@ -65,8 +67,7 @@ PathTracerSettings path_tracer_settings(const PictureRequest& request) {
 }
 
 /// What became of the environments that bright sources are split off from.
-void say_environment(Console& console, const PrecomputedRenderer& renderer) {
-  const FittedLights& fitted = renderer.fitted_lights();
+void say_environment(Console& console, const FittedLights& fitted) {
   if (fitted.bright_sources == 0) return;
   console.say(
       fmt::format("environment: {} bright {} split off; irradiance is off by {:.2g} % (RMS "
@@ -121,7 +122,7 @@ SceneJob::SceneJob(const fs::path& scene_file, StageContext& context, const Scen
   const TomlTable document = TomlTable::load(scene_file);
   config_ = read_scene_config(document, frame);
   auto text = nlohmann::json::parse(document.canonical_text());
-  for (const char* key : {"name", "frame", "camera", "view", "render"}) text.erase(key);
+  for (const char* key : {"name", "frame", "camera", "view", "render", "png"}) text.erase(key);
   for (auto& cloth : text.at("cloth")) cloth.erase("surface_method");  // part of the key on its own
   scene_text_ = text.dump();
   for (const std::size_t k : variant.stand_ins)
@@ -192,7 +193,15 @@ PictureRequest SceneJob::request(const ViewConfig& view) const {
   request.method = config_.method;
   request.spp = view.spp;
   request.seed = context_->picture_seed.value_or(config_.seed);
+  request.filter = config_.filter;
   return request;
+}
+
+PictureRequest SceneJob::request_with_layers(const ViewConfig& view) const {
+  PictureRequest with_layers = request(view);
+  with_layers.layers = config_.layers;
+  with_layers.light_groups = true;
+  return with_layers;
 }
 
 PictureRequest SceneJob::reference_request(const ViewConfig& view) const {
@@ -256,6 +265,13 @@ std::string SceneJob::picture_key(const PictureRequest& request) {
   values.emplace_back("method", render_method_name(request.method));
   values.emplace_back("crop", crop_text(request.crop));
   values.emplace_back("sampling", fmt::format("spp {} seed {}", request.spp, request.seed));
+  if (!request.filter.is_default()) values.emplace_back("filter", request.filter.text());
+  if (request.layers.any()) {
+    values.emplace_back("layers",
+                        fmt::format("lobes {} surface {} cryptomatte {}", request.layers.lobes,
+                                    request.layers.surface, request.layers.cryptomatte));
+  }
+  if (groups_of(request) > 1) values.emplace_back("light_groups", "apart");
   if (request.noise) values.emplace_back("noise", fmt::format("{}", *request.noise));
   values.emplace_back("paths",
                       fmt::format("local {} bounces {} estimator {}", request.local,
@@ -361,8 +377,10 @@ std::unique_ptr<SceneJob::Loaded> SceneJob::load_fabrics(RenderMethod method) {
 
 /// One of the two renderers, set up for a picture.
 struct SceneJob::Shading {
+  std::vector<std::vector<Light>> lights;                     // [group]
+  std::map<const void*, std::vector<BcsdfTable>> reflecting;  // by whose materials they are
   std::optional<PathTracer> tracer;
-  std::optional<PrecomputedRenderer> renderer;
+  std::vector<std::unique_ptr<const PrecomputedRenderer>> renderers;  // [group]
 
   FrameBuffers frame(const PictureRequest& request, const Camera& camera, const PixelRect& crop,
                      const RenderProgress& progress) const {
@@ -371,7 +389,19 @@ struct SceneJob::Shading {
       return trace_picture(*tracer, camera, crop, request.seed,
                            {request.spp, request.seconds, more}, progress);
     }
-    return shade_picture(*renderer, camera, crop, request.spp, progress, more);
+    std::vector<const PrecomputedRenderer*> by_group;
+    for (const auto& renderer : renderers) by_group.push_back(renderer.get());
+    return shade_picture(by_group, camera, crop, request.spp, progress, more);
+  }
+
+  /// Of the environments that are fitted worst.
+  FittedLights fitted_lights() const {
+    FittedLights worst;
+    for (const auto& renderer : renderers) {
+      const FittedLights& fitted = renderer->fitted_lights();
+      if (fitted.relative_error >= worst.relative_error) worst = fitted;
+    }
+    return worst;
   }
 };
 
@@ -380,23 +410,44 @@ std::unique_ptr<SceneJob::Shading> SceneJob::shading_for(const PictureRequest& r
   const Loaded& loaded = loaded_for(request.method);
   auto shading = std::make_unique<Shading>();
   if (traces_paths(request.method)) {
+    PathTracerSettings settings = path_tracer_settings(request);
+    settings.light_groups = groups_of(request);
+    std::vector<BcsdfTable>& reflecting = shading->reflecting[&loaded.materials];
+    if (request.layers.lobes) reflecting = without_transmission(loaded.materials);
     shading->tracer.emplace(*loaded.scene, loaded.materials, config_.lights, config_.background,
-                            path_tracer_settings(request));
+                            settings, reflecting);
     return shading;
   }
   std::optional<float> far_from;
   if (config_.far_from) far_from = static_cast<float>(*config_.far_from);
-  const PrecomputedSettings settings{.seed = request.seed,
-                                     .method = request.method,
-                                     .shadow_sigma_mm = config_.shadow_sigma_mm,
-                                     .blend = blend_for(request.method),
-                                     .transfer_order = transfer_order,
-                                     .far_from = far_from,
-                                     .bounces = config_.bounces,
-                                     .far_forms = loaded.far_forms,
-                                     .interactive = loaded.interactive};
-  shading->renderer.emplace(*loaded.scene, loaded.part_packs, config_.lights, config_.background,
-                            settings);
+  PrecomputedSettings settings{.seed = request.seed,
+                               .method = request.method,
+                               .shadow_sigma_mm = config_.shadow_sigma_mm,
+                               .blend = blend_for(request.method),
+                               .transfer_order = transfer_order,
+                               .far_from = far_from,
+                               .bounces = config_.bounces,
+                               .far_forms = loaded.far_forms,
+                               .interactive = loaded.interactive,
+                               .filter = request.filter};
+  for (const FabricPack* pack : loaded.part_packs) {
+    if (!request.layers.lobes) break;
+    std::vector<BcsdfTable>& reflecting = shading->reflecting[pack];
+    if (reflecting.empty()) reflecting = without_transmission(pack->materials);
+    settings.reflecting.emplace_back(reflecting);
+  }
+  shading->lights.resize(groups_of(request));
+  for (const Light& light : config_.lights)
+    shading->lights[shading->lights.size() == 1 ? 0 : light.group].push_back(light);
+  for (std::size_t group = 0; group < shading->lights.size(); ++group) {
+    // Noise of different groups is independent; only the first one looks through the pixels.
+    settings.seed = request.seed + (std::uint64_t{group} << 40U);
+    if (group > 0 && method_row(settings.method).marches_volume)
+      settings.method = RenderMethod::kExact;
+    shading->renderers.push_back(std::make_unique<const PrecomputedRenderer>(
+        *loaded.scene, loaded.part_packs, shading->lights[group],
+        group == 0 ? config_.background : Rgb(Rgb::Zero()), settings));
+  }
   return shading;
 }
 
@@ -423,12 +474,36 @@ const ClothScene& SceneJob::fibers_scene() {
   return *loaded_for(RenderMethod::kPath).scene;
 }
 
+void SceneJob::add_layers(const PictureRequest& request, const Shading& shading,
+                          const Camera& camera, FrameBuffers& frame) {
+  const Loaded& loaded = loaded_for(request.method);
+  const GBufferPass own_rays(*loaded.scene, loaded.part_packs, {}, {}, request.seed,
+                             request.filter);
+  const auto eye_rays = [&](const PixelRect& block, int first, int last) {
+    stop_if_interrupted();
+    return shading.renderers.empty()
+               ? own_rays.run(camera, block, first, last)
+               : shading.renderers.front()->g_buffer(camera, block, first, last);
+  };
+  add_scene_layers(
+      *loaded.scene, layer_pieces_of(config_), eye_rays, camera, request.crop, request.seed,
+      {.surface = request.layers.surface, .mattes = request.layers.cryptomatte}, frame);
+}
+
 PictureResult SceneJob::render(const PictureRequest& request, const std::string& title,
                                bool quiet) {
+  if (request.layers.lobes && !method_row(request.method).tells_lobes) {
+    throw ConfigError(fmt::format("render.layers: the method {} does not tell lobes apart",
+                                  render_method_name(request.method)));
+  }
   // More samples than one are possible where a picture goes on until it is good enough.
-  const std::uint64_t bytes =
-      picture_bytes(request.crop.width, request.crop.height,
-                    request.more || request.noise ? 2 : request.spp, !traces_paths(request.method));
+  const std::uint64_t bytes = picture_bytes(request.crop.width, request.crop.height,
+                                            request.more || request.noise ? 2 : request.spp,
+                                            {.of_fibers = !traces_paths(request.method),
+                                             .light_groups = groups_of(request),
+                                             .transmitted = request.layers.lobes,
+                                             .of_scene = request.layers.surface,
+                                             .mattes = request.layers.cryptomatte});
   announce_memory(*context_->console,
                   fmt::format("{}: {} x {} pixels", title, request.crop.width, request.crop.height),
                   bytes);
@@ -468,8 +543,12 @@ PictureResult SceneJob::render(const PictureRequest& request, const std::string&
   };
 
   const std::unique_ptr<Shading> shading = shading_for(request);
-  if (shading->renderer && !quiet) say_environment(*context_->console, *shading->renderer);
-  const FrameBuffers frame = shading->frame(request, camera, request.crop, report_progress);
+  if (!shading->renderers.empty() && !quiet)
+    say_environment(*context_->console, shading->fitted_lights());
+  FrameBuffers frame = shading->frame(request, camera, request.crop, report_progress);
+  for (std::size_t g = 0; g < frame.light_groups.size(); ++g)
+    frame.light_groups[g].name = config_.light_groups[g];
+  add_layers(request, *shading, camera, frame);
   if (request.more) {
     PictureRequest made = request;
     made.spp = frame.spp;
@@ -483,7 +562,7 @@ PictureResult SceneJob::render(const PictureRequest& request, const std::string&
   say_from(said);
 
   PictureResult result;
-  const std::map<std::string, std::string> metadata = {
+  std::map<std::string, std::string> metadata = {
       {"software", std::string("heddle ") + kProgramVersion},
       {"heddle.scene", config_.name},
       {"heddle.method", render_method_name(request.method)},
@@ -494,7 +573,10 @@ PictureResult SceneJob::render(const PictureRequest& request, const std::string&
       {"heddle.local", request.local ? "true" : "false"},
       {"heddle.worldToCamera", camera.world_to_camera_text()},
   };
+  if (!request.filter.is_default()) metadata["heddle.filter"] = request.filter.text();
   result.image = image_of(frame, metadata);
+  if (request.crop.width != camera.width() || request.crop.height != camera.height())
+    result.image.frame = {request.crop.x0, request.crop.y0, camera.width(), camera.height()};
   result.time = time;
   for (std::size_t k = 0; k < frame.pixel_count(); ++k) {
     result.mean_samples +=
@@ -504,7 +586,7 @@ PictureResult SceneJob::render(const PictureRequest& request, const std::string&
     const std::vector<double> noise = noise_of_blocks(frame);
     result.largest_noise = *std::max_element(noise.begin(), noise.end());
   }
-  if (shading->renderer) result.fitted_lights = shading->renderer->fitted_lights();
+  result.fitted_lights = shading->fitted_lights();
   result.failed_shell_walks = loaded.scene->failed_walks();
   result.flipped_tetrahedra = loaded.scene->flipped_tets();
   result.degenerate_tetrahedra = loaded.scene->degenerate_tets();
@@ -535,10 +617,15 @@ Json picture_report(const PictureResult& picture) {
   return report;
 }
 
-void write_picture(const fs::path& exr, const PictureResult& picture, const Json& report) {
+void write_screen_picture(const fs::path& png, const Image& image, const ScreenLook& look) {
+  write_png(png, image.width, image.height, tone_map(layer_of(image, "", png.string()), look),
+            look.text());
+}
+
+void write_picture(const fs::path& exr, const PictureResult& picture, const Json& report,
+                   const ScreenLook& look) {
   write_exr(exr, picture.image);
-  write_png(fs::path(exr).replace_extension(".png"), picture.image.width, picture.image.height,
-            tone_map(layer_of(picture.image, "", exr.string()), 0));
+  write_screen_picture(fs::path(exr).replace_extension(".png"), picture.image, look);
   write_file_atomically(fs::path(exr).replace_extension(".json"), report.dump(2) + "\n");
 }
 

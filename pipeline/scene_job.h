@@ -73,6 +73,9 @@ struct PictureRequest {
   MoreSamples more = {};  // beyond spp; needs 2 or more of those
   // Goes on beyond spp, block by block, until the noise is so low (until_noise); not with `more`.
   std::optional<double> noise = {};
+  PixelFilter filter = {};
+  LayerChoice layers = {};    // none where nobody asks
+  bool light_groups = false;  // those of the scene, each in a layer of its own
 };
 
 /// A picture and what is worth knowing of its making.
@@ -104,6 +107,8 @@ class SceneJob {
   void show_frame(int frame);
   /// The picture that a view of the scene asks for.
   PictureRequest request(const ViewConfig& view) const;
+  /// The same with the layers that the scene asks for.
+  PictureRequest request_with_layers(const ViewConfig& view) const;
   /// The path-traced crop that goes with it. Its seed is the next one: an error against a reference
   /// that shares the picture's random numbers would look smaller than it is.
   PictureRequest reference_request(const ViewConfig& view) const;
@@ -145,8 +150,14 @@ class SceneJob {
   Fabrics& fabrics_for(RenderMethod method);
   std::vector<Artifact> packs_for(RenderMethod method);
   const Loaded& loaded_for(RenderMethod method);
+  std::size_t groups_of(const PictureRequest& request) const {
+    return request.light_groups ? config_.light_groups.size() : 1;
+  }
   std::unique_ptr<Loaded> load_fabrics(RenderMethod method);
   const SurfaceStages& surface_stages();
+  /// Layers of what eye rays see.
+  void add_layers(const PictureRequest& request, const Shading& shading, const Camera& camera,
+                  FrameBuffers& frame);
 
   SceneConfig config_;
   std::string scene_text_;  // canonical text of what all pictures of the scene depend on
@@ -161,7 +172,10 @@ class SceneJob {
 
 /// PATH.exr, and beside it a tone-mapped PATH.png and the report as PATH.json.
 void write_picture(const std::filesystem::path& exr, const PictureResult& picture,
-                   const nlohmann::ordered_json& report);
+                   const nlohmann::ordered_json& report, const ScreenLook& look);
+/// The PNG alone.
+void write_screen_picture(const std::filesystem::path& png, const Image& image,
+                          const ScreenLook& look);
 
 }  // namespace heddle
 

@@ -76,7 +76,7 @@ std::vector<Rgb> trace_swatch(const TileScene& tile, bool both_sides, const Swat
 }
 
 void write_swatch(const std::filesystem::path& path, const std::vector<Rgb>& colors, int pixels) {
-  write_png(path, pixels, pixels, tone_map(colors, 0));
+  write_png(path, pixels, pixels, tone_map(colors, {}));
 }
 
 }  // namespace heddle

@@ -15,6 +15,12 @@ struct KeptLight {
   CellLight light;
 };
 
+Rgb scattered_once(const SingleScatteringModel& model, const ShadingPoint& point,
+                   const SeenLight& light, const DirectionPair& axis) {
+  return light.is_directional ? model.directional(point, axis)
+                              : model.spherical_gaussian(point, axis, light.sharpness);
+}
+
 std::unique_ptr<const Transfer> cut_transfer(const ShadingInputs& inputs) {
   if (!inputs.transfer_order) return nullptr;
   return std::make_unique<const Transfer>(
@@ -24,12 +30,14 @@ std::unique_ptr<const Transfer> cut_transfer(const ShadingInputs& inputs) {
 }  // namespace
 
 TransferShading::TransferShading(const ShadingInputs& inputs,
-                                 std::unique_ptr<const SingleScatteringModel> single)
+                                 std::unique_ptr<const SingleScatteringModel> single,
+                                 std::unique_ptr<const SingleScatteringModel> reflecting)
     : scene_(inputs.scene),
       lights_(inputs.lights),
       shapes_(inputs.shapes),
       near_shapes_(inputs.near_shapes),
       single_(std::move(single)),
+      reflecting_(std::move(reflecting)),
       cut_transfer_(cut_transfer(inputs)),
       transfer_(cut_transfer_ ? cut_transfer_.get() : &*inputs.pack->transfer),
       multiple_(*transfer_, inputs.pack->materials, inputs.pack->bundle_tangent) {}
@@ -55,10 +63,13 @@ void TransferShading::shade(const GBuffer& g_buffer, const LightVisibility& visi
       const SeenLight light = seen_from(lights_[l], fiber.hit.position);
       const DirectionPair axis = {light.axis, scene_->fabric_direction(fiber.hit, light.axis)};
       if (visible.at_point) {
-        sample.single +=
-            weight * light.irradiance *
-            (light.is_directional ? single_->directional(point, axis)
-                                  : single_->spherical_gaussian(point, axis, light.sharpness));
+        const Rgb single = weight * light.irradiance * scattered_once(*single_, point, light, axis);
+        sample.single += single;
+        if (reflecting_) {
+          const Rgb reflected =
+              weight * light.irradiance * scattered_once(*reflecting_, point, light, axis);
+          sample.transmitted += (single - reflected).max(0.0F);
+        }
       }
       if (!visible.nearby) continue;
       any_nearby = true;

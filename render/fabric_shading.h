@@ -35,6 +35,8 @@ struct ShadingInputs {
   VisibilityBlend blend;
   // Highest band of the transfer that is used; all of them where empty.
   std::optional<int> transfer_order;
+  // The pack's materials without TT, where EyeSample::transmitted is asked for; else empty.
+  std::span<const BcsdfTable> reflecting = {};
 };
 
 class FabricShading {
@@ -54,7 +56,9 @@ class FabricShading {
 /// while cell and light direction stay the same; near lights are summed before the transfer.
 class TransferShading final : public FabricShading {
  public:
-  TransferShading(const ShadingInputs& inputs, std::unique_ptr<const SingleScatteringModel> single);
+  /// reflecting: the same model of fibers without TT, where EyeSample::transmitted is asked for.
+  TransferShading(const ShadingInputs& inputs, std::unique_ptr<const SingleScatteringModel> single,
+                  std::unique_ptr<const SingleScatteringModel> reflecting = {});
   void shade(const GBuffer& g_buffer, const LightVisibility& visibility,
              std::span<const std::uint32_t> fibers, std::span<EyeSample> seen) const override;
   Rgb under(const SeenFiber& fiber, const SeenLight& light) const override;
@@ -65,7 +69,8 @@ class TransferShading final : public FabricShading {
   std::span<const MultipleScattering::LightShape> shapes_;
   const LightShapes* near_shapes_;
   std::unique_ptr<const SingleScatteringModel> single_;
-  std::unique_ptr<const Transfer> cut_transfer_;  // in place of the pack's
+  std::unique_ptr<const SingleScatteringModel> reflecting_;  // may be null
+  std::unique_ptr<const Transfer> cut_transfer_;             // in place of the pack's
   const Transfer* transfer_;
   MultipleScattering multiple_;
 };

@@ -17,12 +17,13 @@ RandomStream GBuffer::random(std::uint64_t seed, RandomStage stage, std::uint32_
 
 GBufferPass::GBufferPass(const ClothScene& scene, std::vector<const FabricPack*> packs,
                          std::vector<std::shared_ptr<const IdBricks>> bricks,
-                         std::optional<float> far_from, std::uint64_t seed)
+                         std::optional<float> far_from, std::uint64_t seed, PixelFilter filter)
     : scene_(&scene),
       packs_(std::move(packs)),
       bricks_(std::move(bricks)),
       far_from_(far_from),
-      seed_(seed) {}
+      seed_(seed),
+      filter_(std::move(filter)) {}
 
 GBuffer GBufferPass::run(const Camera& camera, const PixelRect& block, int first, int last) const {
   GBuffer g_buffer;
@@ -34,8 +35,8 @@ GBuffer GBufferPass::run(const Camera& camera, const PixelRect& block, int first
   for (std::uint32_t sample = 0; sample < g_buffer.sample_count(); ++sample) {
     const int pixel = static_cast<int>(sample) / g_buffer.per_pixel();
     RandomStream random = g_buffer.random(seed_, RandomStage::kEyeRay, sample);
-    const double x = block.x0 + pixel % block.width + random.uniform_double();
-    const double y = block.y0 + pixel / block.width + random.uniform_double();
+    const double x = block.x0 + pixel % block.width + filter_.place(random.uniform_double());
+    const double y = block.y0 + pixel / block.width + filter_.place(random.uniform_double());
     const EyeRay ray = camera.ray(x, y);
     look(ray, sample, far_from_ ? random.uniform() : 0.0F, g_buffer);
   }
@@ -79,6 +80,56 @@ void GBufferPass::look(const EyeRay& ray, std::uint32_t sample, float far_draw,
         {sample, mesh->mesh,
          mesh->surface->hit(mesh->triangle, mesh->u, mesh->v, ray.direction, ray.spread * mesh->t),
          wo, way.left()});
+  } else if (mesh) {
+    g_buffer.meshes.push_back({sample,
+                               mesh->mesh - static_cast<std::uint32_t>(scene_->surfaces().size()),
+                               ray.origin + mesh->t * ray.direction.cast<double>(), way.left()});
+  }
+}
+
+std::size_t place_in_picture(const PixelRect& block, const PixelRect& crop, int pixel) {
+  const int x = block.x0 - crop.x0 + pixel % block.width;
+  const int y = block.y0 - crop.y0 + pixel / block.width;
+  return static_cast<std::size_t>(y) * static_cast<std::size_t>(crop.width) +
+         static_cast<std::size_t>(x);
+}
+
+void keep_first_samples(FrameBuffers& frame) {
+  const std::size_t count = frame.pixel_count();
+  frame.segment.assign(count, kNoSegment);
+  frame.cell.assign(count, kNoSegment);
+  frame.fabric_position.assign(count, Vec3::Zero());
+  frame.depth.assign(count, 0.0F);
+  frame.tangent.assign(count, Vec3::Zero());
+}
+
+void store_first_samples(const ClothScene& scene, const GBuffer& g_buffer, const Camera& camera,
+                         const PixelRect& crop, FrameBuffers& frame) {
+  const auto store = [&](std::uint32_t sample, std::uint32_t segment, std::uint32_t cell,
+                         const Vec3d& world, const Vec3& fabric, const Vec3& tangent) {
+    const int place = static_cast<int>(sample);
+    if (place % g_buffer.per_pixel() != 0) return;
+    const std::size_t k = place_in_picture(g_buffer.block, crop, place / g_buffer.per_pixel());
+    frame.segment[k] = segment;
+    if (!frame.cell.empty()) frame.cell[k] = cell;
+    frame.fabric_position[k] = fabric;
+    frame.depth[k] = static_cast<float>(camera.depth(world));
+    frame.tangent[k] = tangent;
+  };
+  for (const SeenFiber& fiber : g_buffer.fibers) {
+    store(fiber.sample, fiber.hit.segment, fiber.point.cell, fiber.hit.position,
+          fiber.hit.fabric.cast<float>(), fiber.point.tangent.world);
+  }
+  for (const SeenFar& far : g_buffer.far) {
+    // of the weft
+    const Vec3 tangent = scene.shell(far.hit.cloth).world_from_fabric(far.hit.tet).col(0);
+    store(far.sample, kNoSegment, kNoSegment, far.hit.position, far.hit.fabric.cast<float>(),
+          tangent.normalized());
+  }
+  for (const SeenSurface& surface : g_buffer.surfaces) {
+    const Vec2& place = surface.hit.point.position_mm;
+    store(surface.sample, kNoSegment, kNoSegment, surface.hit.position,
+          Vec3(place.x(), place.y(), 0), surface.hit.world_from_patch.col(0).cast<float>());
   }
 }
 

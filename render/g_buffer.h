@@ -4,6 +4,7 @@
 // light, so one G-buffer serves any lighting of the same view. Eye rays are those of the path
 // tracer with the same seed. Tested in tests/render/precomputed_renderer_test.cpp.
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -15,6 +16,8 @@
 #include "fibers/math/vector.h"
 #include "render/camera.h"
 #include "render/cloth_scene.h"
+#include "render/pixel_filter.h"
+#include "render/render_output.h"
 #include "render/single_scattering.h"
 #include "render/surface_cloth.h"
 
@@ -48,6 +51,14 @@ struct SeenSurface {
   float weight = 1;  // share of the sample
 };
 
+/// A sample that sees a black mesh.
+struct SeenMesh {
+  std::uint32_t sample;  // which of the block's
+  std::uint32_t mesh;    // as MeshHit::mesh, less ClothScene::surfaces()
+  Vec3d position;        // world, mm
+  float weight = 1;      // share of the sample
+};
+
 /// Samples first .. last - 1 of every pixel of `block`: sample k is number first + k % per_pixel()
 /// of pixel k / per_pixel(), pixels row by row.
 struct GBuffer {
@@ -57,10 +68,11 @@ struct GBuffer {
   std::uint64_t frame_width = 0;  // px, of the whole picture
   // [sample] share that meets cloth or a mesh
   std::vector<float> covered;
-  // In the order of their samples; what of a covered sample is in none of them sees black.
+  // In the order of their samples.
   std::vector<SeenFiber> fibers;
   std::vector<SeenFar> far;
   std::vector<SeenSurface> surfaces;
+  std::vector<SeenMesh> meshes;
 
   int per_pixel() const { return last - first; }
   std::uint32_t sample_count() const {
@@ -70,6 +82,9 @@ struct GBuffer {
   /// the pixel of the whole picture, so they depend neither on the crop nor on the block.
   RandomStream random(std::uint64_t seed, RandomStage stage, std::uint32_t sample) const;
 };
+
+/// Where pixel `pixel` of a block, row by row, lies in a picture of the crop.
+std::size_t place_in_picture(const PixelRect& block, const PixelRect& crop, int pixel);
 
 class FarWay;
 
@@ -81,7 +96,7 @@ class GBufferPass {
   /// the packs outlive the object.
   GBufferPass(const ClothScene& scene, std::vector<const FabricPack*> packs,
               std::vector<std::shared_ptr<const IdBricks>> bricks, std::optional<float> far_from,
-              std::uint64_t seed);
+              std::uint64_t seed, PixelFilter filter = {});
 
   GBuffer run(const Camera& camera, const PixelRect& block, int first, int last) const;
 
@@ -94,7 +109,14 @@ class GBufferPass {
   std::vector<std::shared_ptr<const IdBricks>> bricks_;
   std::optional<float> far_from_;
   std::uint64_t seed_;
+  PixelFilter filter_;
 };
+
+/// Makes room for the layers of each pixel's first sample.
+void keep_first_samples(FrameBuffers& frame);
+/// Writes them for the pixels of the G-buffer, whose samples begin with the first one.
+void store_first_samples(const ClothScene& scene, const GBuffer& g_buffer, const Camera& camera,
+                         const PixelRect& crop, FrameBuffers& frame);
 
 }  // namespace heddle
 

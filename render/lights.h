@@ -58,6 +58,8 @@ struct Light {
   Vec3d half_up_mm = Vec3d(0, 0, 0);
   std::shared_ptr<const RadiancePicture> texture = {};  // rectangles only; may be null
 
+  std::uint16_t group = 0;  // of those whose light is kept apart (SceneConfig::light_groups)
+
   bool is_directional() const { return type == LightType::kDirectional; }
   bool is_near() const {
     return type == LightType::kPoint || type == LightType::kSphere || type == LightType::kRectangle;

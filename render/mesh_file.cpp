@@ -216,6 +216,10 @@ Eigen::Vector2d FabricPlacement::fabric_of(const Eigen::Vector2d& uv_mm) const {
   return Eigen::Rotation2Dd(-turn) * (tiling.cwiseProduct(uv_mm) - offset_mm);
 }
 
+Eigen::Vector2d FabricPlacement::uv_mm_of(const Eigen::Vector2d& fabric) const {
+  return (Eigen::Rotation2Dd(turn) * fabric + offset_mm).cwiseQuotient(tiling);
+}
+
 EdgePieces pieces_in_pictures(std::span<const Camera> cameras, double most_pixels) {
   return [cameras = std::vector<Camera>(cameras.begin(), cameras.end()), most_pixels](
              const Vec3d& a, const Vec3d& b) {

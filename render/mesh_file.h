@@ -42,6 +42,8 @@ struct FabricPlacement {
   bool is_identity() const { return tiling.isOnes(0) && turn == 0 && offset_mm.isZero(0); }
   /// Fabric coordinates of a place of the UVs, both in millimetres.
   Eigen::Vector2d fabric_of(const Eigen::Vector2d& uv_mm) const;
+  /// And back.
+  Eigen::Vector2d uv_mm_of(const Eigen::Vector2d& fabric) const;
 };
 
 /// An OBJ file as a scene asks for it.
@@ -50,7 +52,8 @@ struct MeshFile {
   // of a sequence: one file per frame (numbered_file.h), of which `path` is one; else empty
   std::filesystem::path numbered;
   double mm_per_unit = 1;
-  std::string group;  // name of a group or object; empty: all of the file
+  std::string group;      // name of a group or object; empty: all of the file
+  std::string name = {};  // in mattes; empty: by its number. Of meshes only: cloths have their own
   // As a subdivision surface: 2^subdivide pieces of each edge, or so many that none of them is
   // longer than this in the pictures; neither: as it is.
   int subdivide = 0;

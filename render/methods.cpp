@@ -13,12 +13,21 @@ namespace {
 
 using Shading = std::unique_ptr<const FabricShading>;
 
-Shading by_gaussians_and_distances(const ShadingInputs& inputs, SgMethod gamma) {
-  const FabricPack& pack = *inputs.pack;
+/// Multiple scattering by the transfer. `model` makes single scattering from materials.
+template <class Model>
+Shading with_transfer(const ShadingInputs& inputs, const Model& model) {
   return std::make_unique<TransferShading>(
-      inputs, std::make_unique<SingleScattering>(pack.ssdf ? &*pack.ssdf : nullptr,
-                                                 pack.sgs ? &*pack.sgs : nullptr, pack.materials,
-                                                 inputs.blend, gamma));
+      inputs, model(std::span<const BcsdfTable>(inputs.pack->materials)),
+      inputs.reflecting.empty() ? nullptr : model(inputs.reflecting));
+}
+
+Shading by_gaussians_and_distances(const ShadingInputs& inputs, SgMethod gamma) {
+  return with_transfer(inputs, [&](std::span<const BcsdfTable> materials) {
+    const FabricPack& pack = *inputs.pack;
+    return std::make_unique<SingleScattering>(pack.ssdf ? &*pack.ssdf : nullptr,
+                                              pack.sgs ? &*pack.sgs : nullptr, materials,
+                                              inputs.blend, gamma);
+  });
 }
 
 Shading shipped(const ShadingInputs& inputs) {
@@ -30,18 +39,18 @@ Shading printed(const ShadingInputs& inputs) {
 }
 
 Shading prt(const ShadingInputs& inputs) {
-  const FabricPack& pack = *inputs.pack;
-  return std::make_unique<TransferShading>(
-      inputs,
-      std::make_unique<PrtScattering>(*pack.ssdf, pack.light_from_both_sides, pack.materials));
+  return with_transfer(inputs, [&](std::span<const BcsdfTable> materials) {
+    return std::make_unique<PrtScattering>(*inputs.pack->ssdf, inputs.pack->light_from_both_sides,
+                                           materials);
+  });
 }
 
 template <int kTerms>
 Shading tsai_shih(const ShadingInputs& inputs) {
-  const FabricPack& pack = *inputs.pack;
-  return std::make_unique<TransferShading>(
-      inputs, std::make_unique<TsaiShihScattering>(*pack.ssdf, pack.light_from_both_sides,
-                                                   pack.materials, kTerms));
+  return with_transfer(inputs, [&](std::span<const BcsdfTable> materials) {
+    return std::make_unique<TsaiShihScattering>(
+        *inputs.pack->ssdf, inputs.pack->light_from_both_sides, materials, kTerms);
+  });
 }
 
 Shading dual_scattering(const ShadingInputs& inputs) {
@@ -90,6 +99,7 @@ constexpr std::array<MethodRow, kRenderMethodCount> kRows = {{
      .make_shading = tsai_shih<BcsdfFactors::kAllTerms>},
     {.method = kDualScattering,
      .name = "dual-scattering",
+     .tells_lobes = false,
      .draws_light = true,
      .make_shading = dual_scattering},
 }};

@@ -56,6 +56,8 @@ struct MethodRow {
   bool takes_transfer = false;  // for multiple scattering
   // Data baked, visibility blended and light projected as Khungurn 2017 prints it.
   bool as_printed = false;
+  // Tells which part of single scattering came through the fiber (EyeSample::transmitted).
+  bool tells_lobes = true;
   // Takes all of a light from one direction drawn from it (LightVisibility::direction).
   bool draws_light = false;
   bool has_far_form = false;  // for pixels that cover many repeats

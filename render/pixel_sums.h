@@ -4,6 +4,10 @@
 // buffers. The path tracer and the precomputed methods share them. Sums run in the order of the
 // calls. Tested in tests/render/path_tracer_test.cpp and precomputed_renderer_test.cpp.
 
+#include <cstddef>
+#include <span>
+#include <vector>
+
 #include "fibers/math/vector.h"
 #include "render/render_output.h"
 
@@ -15,6 +19,8 @@ struct EyeSample {
   Rgb multiple = Rgb::Zero();
   Rgb background = Rgb::Zero();
   float alpha = 0;  // 1 where the eye ray meets cloth or a mesh
+  // Part of `single` that came through the fiber, its lobe TT; where that is asked for.
+  Rgb transmitted = Rgb::Zero();
 };
 
 class PixelSums {
@@ -51,6 +57,51 @@ class PixelSums {
   Rgbd squares_ = Rgbd::Zero();
   double alpha_ = 0;
 };
+
+/// Sums of what FrameBuffers::keep_parts() makes room for; nothing where that keeps nothing.
+class PartSums {
+ public:
+  PartSums(std::size_t pixels, std::size_t groups, bool with_transmitted)
+      : groups_(groups > 1 ? groups : 0),
+        sums_(groups > 1 || with_transmitted ? pixels * stride() : 0, Rgbd::Zero()) {}
+
+  /// by_group: of one sample, the parts that add up to it.
+  void add(std::size_t pixel, std::span<const EyeSample> by_group) {
+    if (sums_.empty()) return;
+    Rgbd* const sums = &sums_[pixel * stride()];
+    sums[0] += by_group[0].background.cast<double>();
+    for (const EyeSample& group : by_group) sums[1] += group.transmitted.cast<double>();
+    for (std::size_t g = 0; g < groups_; ++g)
+      sums[2 + g] += (by_group[g].single + by_group[g].multiple).cast<double>();
+  }
+  /// Writes pixel k of the frame from the sums of `pixel`, which has so many samples.
+  void store(std::size_t pixel, int spp, std::size_t k, FrameBuffers& frame) const {
+    if (sums_.empty()) return;
+    const auto mean = [&](std::size_t part) {
+      return (sums_[pixel * stride() + part] / spp).cast<float>().eval();
+    };
+    frame.background[k] = mean(0);
+    if (!frame.transmitted.empty()) frame.transmitted[k] = mean(1);
+    for (std::size_t g = 0; g < groups_; ++g) frame.light_groups[g].light[k] = mean(2 + g);
+  }
+
+ private:
+  std::size_t stride() const { return 2 + groups_; }
+
+  std::size_t groups_;
+  std::vector<Rgbd> sums_;  // [pixel][background, transmitted, groups]
+};
+
+/// A sample of all light from those of its groups. Background and alpha are in the first.
+inline EyeSample sum_of_groups(std::span<const EyeSample> by_group) {
+  EyeSample sum = by_group[0];
+  for (const EyeSample& group : by_group.subspan(1)) {
+    sum.single += group.single;
+    sum.multiple += group.multiple;
+    sum.transmitted += group.transmitted;
+  }
+  return sum;
+}
 
 }  // namespace heddle
 

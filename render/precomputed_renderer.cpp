@@ -171,7 +171,7 @@ PrecomputedRenderer::PrecomputedRenderer(const ClothScene& scene,
       shadings_(make_shadings()),
       own_scatterings_(own_scatterings_of(scene, packs_)),
       g_buffer_pass_(scene, packs_, bricks_of(packs, method_row(settings.method)),
-                     far_from_of(settings), settings.seed),
+                     far_from_of(settings), settings.seed, settings.filter),
       visibility_pass_(scene, visibility_parts(scene, packs, settings.shadow_sigma_mm), lights_,
                        method_row(settings.method).draws_light, settings.seed),
       far_shading_(scene, settings.far_forms, lights_, shapes_, near_shapes_),
@@ -192,7 +192,10 @@ std::vector<std::shared_ptr<const FabricShading>> PrecomputedRenderer::make_shad
                                  .shapes = shapes_,
                                  .near_shapes = &near_shapes_,
                                  .blend = settings_.blend,
-                                 .transfer_order = settings_.transfer_order});
+                                 .transfer_order = settings_.transfer_order,
+                                 .reflecting = settings_.reflecting.empty()
+                                                   ? std::span<const BcsdfTable>{}
+                                                   : settings_.reflecting[part]});
     }
     shadings.push_back(own);
   }
@@ -263,6 +266,7 @@ void PrecomputedRenderer::tint_yarns(const GBuffer& g_buffer, std::span<EyeSampl
     const Rgb tint = scene_->tint(fiber.hit);
     EyeSample& sample = seen[fiber.sample];
     sample.single *= tint;
+    sample.transmitted *= tint;
     for (int c = 0; c < 3; ++c) sample.multiple[c] *= std::pow(tint[c], (*scatterings)[c]);
   }
 }
@@ -290,11 +294,7 @@ namespace {
 FrameBuffers empty_frame(int width, int height, int spp) {
   FrameBuffers frame(width, height);
   const std::size_t count = frame.pixel_count();
-  frame.segment.assign(count, kNoSegment);
-  frame.cell.assign(count, kNoSegment);
-  frame.fabric_position.assign(count, Vec3::Zero());
-  frame.depth.assign(count, 0.0F);
-  frame.tangent.assign(count, Vec3::Zero());
+  keep_first_samples(frame);
   if (spp >= 2) {
     frame.half0.resize(count);
     frame.half1.resize(count);
@@ -306,35 +306,48 @@ FrameBuffers empty_frame(int width, int height, int spp) {
 /// A picture that grows by blocks of pixels.
 class BlockPicture {
  public:
-  BlockPicture(const PrecomputedRenderer& renderer, const Camera& camera, const PixelRect& crop,
-               FrameBuffers& frame)
-      : renderer_(&renderer),
+  BlockPicture(std::span<const PrecomputedRenderer* const> by_group, const Camera& camera,
+               const PixelRect& crop, FrameBuffers& frame)
+      : by_group_(by_group),
         camera_(&camera),
         crop_(crop),
         columns_((crop.width + kBlockEdge - 1) / kBlockEdge),
         rows_((crop.height + kBlockEdge - 1) / kBlockEdge),
         frame_(&frame),
-        sums_(static_cast<std::size_t>(block_count()) * kBlockPixels) {}
+        sums_(static_cast<std::size_t>(block_count()) * kBlockPixels),
+        parts_(sums_.size(), by_group.size(), by_group[0]->tells_transmitted()) {}
 
   int block_count() const { return columns_ * rows_; }
-  std::size_t first_pixel(int index) const { return place_in_frame(block_at(index), 0); }
+  std::size_t first_pixel(int index) const { return place_in_picture(block_at(index), crop_, 0); }
 
   /// Samples first_sample .. last_sample - 1 of a block's pixels; those before are there.
   void shade_block(int index, int first_sample, int last_sample) {
     if (first_sample == last_sample) return;
     const PixelRect block = block_at(index);
-    PixelSums* const sums = &sums_[static_cast<std::size_t>(index) * kBlockPixels];
+    const std::size_t first_sum = static_cast<std::size_t>(index) * kBlockPixels;
+    std::vector<std::vector<EyeSample>> seen(by_group_.size());  // [group][sample]
+    std::vector<EyeSample> by_group(by_group_.size());           // of one sample
     for (int first = first_sample; first < last_sample; first += kBlockSamples) {
       const int last = std::min(last_sample, first + kBlockSamples);
-      const GBuffer g_buffer = renderer_->g_buffer(*camera_, block, first, last);
-      const LightVisibility visibility = renderer_->light_visibility(g_buffer);
-      const std::vector<EyeSample> seen = renderer_->shade(g_buffer, visibility);
-      for (int k = 0; k < static_cast<int>(seen.size()); ++k)
-        sums[k / (last - first)].add(seen[k], first + k % (last - first));
-      if (first == 0) store_first_samples(g_buffer);
+      const GBuffer g_buffer = by_group_[0]->g_buffer(*camera_, block, first, last);
+      for (std::size_t g = 0; g < seen.size(); ++g)
+        seen[g] = by_group_[g]->shade(g_buffer, by_group_[g]->light_visibility(g_buffer));
+      for (int k = 0; k < static_cast<int>(seen[0].size()); ++k) {
+        for (std::size_t g = 0; g < seen.size(); ++g)
+          by_group[g] = seen[g][static_cast<std::size_t>(k)];
+        const std::size_t pixel = first_sum + static_cast<std::size_t>(k / (last - first));
+        sums_[pixel].add(sum_of_groups(by_group), first + k % (last - first));
+        parts_.add(pixel, by_group);
+      }
+      if (first == 0)
+        store_first_samples(by_group_[0]->scene(), g_buffer, *camera_, crop_, *frame_);
     }
-    for (int pixel = 0; pixel < block.width * block.height; ++pixel)
-      sums[pixel].store(last_sample, place_in_frame(block, pixel), *frame_);
+    for (int pixel = 0; pixel < block.width * block.height; ++pixel) {
+      const std::size_t sum = first_sum + static_cast<std::size_t>(pixel);
+      const std::size_t place = place_in_picture(block, crop_, pixel);
+      sums_[sum].store(last_sample, place, *frame_);
+      parts_.store(sum, last_sample, place, *frame_);
+    }
   }
 
  private:
@@ -347,48 +360,14 @@ class BlockPicture {
             std::min(kBlockEdge, crop_.height - top)};
   }
 
-  std::size_t place_in_frame(const PixelRect& block, int pixel) const {
-    const int x = block.x0 - crop_.x0 + pixel % block.width;
-    const int y = block.y0 - crop_.y0 + pixel / block.width;
-    return static_cast<std::size_t>(y) * static_cast<std::size_t>(crop_.width) +
-           static_cast<std::size_t>(x);
-  }
-
-  /// Layers of what the first sample of each pixel sees.
-  void store_first_samples(const GBuffer& g_buffer) {
-    const auto store = [&](std::uint32_t sample, std::uint32_t segment, std::uint32_t cell,
-                           const Vec3d& world, const Vec3& fabric, const Vec3& tangent) {
-      const int place = static_cast<int>(sample);
-      if (place % g_buffer.per_pixel() != 0) return;
-      const std::size_t k = place_in_frame(g_buffer.block, place / g_buffer.per_pixel());
-      frame_->segment[k] = segment;
-      frame_->cell[k] = cell;
-      frame_->fabric_position[k] = fabric;
-      frame_->depth[k] = static_cast<float>(camera_->depth(world));
-      frame_->tangent[k] = tangent;
-    };
-    for (const SeenFiber& fiber : g_buffer.fibers) {
-      store(fiber.sample, fiber.hit.segment, fiber.point.cell, fiber.hit.position,
-            fiber.hit.fabric.cast<float>(), fiber.point.tangent.world);
-    }
-    for (const SeenFar& far : g_buffer.far) {
-      store(far.sample, kNoSegment, kNoSegment, far.hit.position, far.hit.fabric.cast<float>(),
-            renderer_->weft_at(far));
-    }
-    for (const SeenSurface& surface : g_buffer.surfaces) {
-      const Vec2& place = surface.hit.point.position_mm;
-      store(surface.sample, kNoSegment, kNoSegment, surface.hit.position,
-            Vec3(place.x(), place.y(), 0), surface.hit.world_from_patch.col(0).cast<float>());
-    }
-  }
-
-  const PrecomputedRenderer* renderer_;
+  std::span<const PrecomputedRenderer* const> by_group_;
   const Camera* camera_;
   PixelRect crop_;
   int columns_;
   int rows_;
   FrameBuffers* frame_;
   std::vector<PixelSums> sums_;  // [block][pixel]
+  PartSums parts_;               // the same
 };
 
 }  // namespace
@@ -396,8 +375,16 @@ class BlockPicture {
 FrameBuffers shade_picture(const PrecomputedRenderer& renderer, const Camera& camera,
                            const PixelRect& crop, int spp, const RenderProgress& progress,
                            const MoreSamples& more) {
+  const PrecomputedRenderer* all[] = {&renderer};
+  return shade_picture(all, camera, crop, spp, progress, more);
+}
+
+FrameBuffers shade_picture(std::span<const PrecomputedRenderer* const> by_group,
+                           const Camera& camera, const PixelRect& crop, int spp,
+                           const RenderProgress& progress, const MoreSamples& more) {
   FrameBuffers frame = empty_frame(crop.width, crop.height, spp);
-  BlockPicture picture(renderer, camera, crop, frame);
+  frame.keep_parts(by_group.size(), by_group[0]->tells_transmitted());
+  BlockPicture picture(by_group, camera, crop, frame);
   const int blocks = picture.block_count();
   std::vector<int> done(frame.pixel_count(), 0);
   std::vector<int> wanted(frame.pixel_count(), spp);

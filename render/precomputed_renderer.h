@@ -41,6 +41,7 @@
 #include "render/lights.h"
 #include "render/methods.h"
 #include "render/path_tracer.h"
+#include "render/pixel_filter.h"
 #include "render/pixel_sums.h"
 #include "render/render_output.h"
 #include "render/single_scattering.h"
@@ -64,6 +65,10 @@ struct PrecomputedSettings {
   std::vector<std::shared_ptr<const FarForm>> far_forms;
   // [surface cloth] null, or missing at the end: sampled.
   std::vector<std::shared_ptr<const InteractiveSurface>> interactive;
+  PixelFilter filter = {};
+  // [part of the scene] its materials without TT (without_transmission()), where
+  // EyeSample::transmitted is asked for; else empty
+  std::vector<std::span<const BcsdfTable>> reflecting = {};
 };
 
 class PrecomputedRenderer {
@@ -78,6 +83,7 @@ class PrecomputedRenderer {
 
   /// The lights that it shades with, and the errors of what stands for environments.
   const FittedLights& fitted_lights() const { return fitted_; }
+  bool tells_transmitted() const { return !settings_.reflecting.empty(); }
 
   /// Pass 1: samples first .. last - 1 of the pixels of `block`.
   GBuffer g_buffer(const Camera& camera, const PixelRect& block, int first, int last) const {
@@ -90,10 +96,7 @@ class PrecomputedRenderer {
   /// Pass 3: [sample of the G-buffer].
   std::vector<EyeSample> shade(const GBuffer& g_buffer, const LightVisibility& visibility) const;
 
-  /// Direction of the weft where a far form is seen, world; unit.
-  Vec3 weft_at(const SeenFar& far) const {
-    return scene_->shell(far.hit.cloth).world_from_fabric(far.hit.tet).col(0).normalized();
-  }
+  const ClothScene& scene() const { return *scene_; }
 
  private:
   std::vector<std::shared_ptr<const FabricShading>> make_shadings() const;
@@ -129,6 +132,13 @@ class PrecomputedRenderer {
 FrameBuffers shade_picture(const PrecomputedRenderer& renderer, const Camera& camera,
                            const PixelRect& crop, int spp, const RenderProgress& progress,
                            const MoreSamples& more = {});
+
+/// The same with the light of each renderer kept apart: renderers of one scene, each with lights
+/// and a seed of its own. The first one looks through the pixels, and only it has a background.
+/// Order: that of FrameBuffers::light_groups, whose names are left empty.
+FrameBuffers shade_picture(std::span<const PrecomputedRenderer* const> by_group,
+                           const Camera& camera, const PixelRect& crop, int spp,
+                           const RenderProgress& progress, const MoreSamples& more = {});
 
 }  // namespace heddle
 

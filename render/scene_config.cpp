@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <string_view>
 
@@ -24,6 +26,8 @@ constexpr NumberRange kComponent{-1e6, 1e6};
 constexpr NumberRange kLight{0, 1e9};
 constexpr int kMaxPatternExtent = 4096;  // blocks
 constexpr std::size_t kMaxPatternFabrics = 256;
+// A layer of each; files of ours may have 1024 channels.
+constexpr std::size_t kMostLightGroups = 64;
 
 Vec3d vector_of(const std::array<double, 3>& values) {
   return {values[0], values[1], values[2]};
@@ -63,6 +67,13 @@ CameraConfig read_camera(const TomlTable& table) {
   return camera;
 }
 
+bool is_plain_name(std::string_view name) {
+  return std::all_of(name.begin(), name.end(), [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' ||
+           c == '_';
+  });
+}
+
 ReferenceConfig read_reference(const TomlTable& table, const CameraConfig& camera) {
   ReferenceConfig reference;
   const std::array<int, 2> corner = whole_pixels(table, "corner_px", 0);
@@ -93,13 +104,18 @@ ViewConfig read_view(const TomlTable& table, const SceneConfig& scene, int defau
   return view;
 }
 
+/// Nothing where the key is absent.
+std::string read_matte_name(const TomlTable& table) {
+  if (!table.has("name")) return "";
+  std::string name = table.string("name");
+  if (name.empty() || !is_plain_name(name))
+    table.fail("name", "expected letters, digits, - and _: it becomes the name of a matte");
+  return name;
+}
+
 std::string read_view_name(const TomlTable& table, const SceneConfig& scene) {
   std::string name = table.string("name");
-  const auto is_plain = [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' ||
-           c == '_';
-  };
-  if (name.empty() || !std::all_of(name.begin(), name.end(), is_plain)) {
+  if (name.empty() || !is_plain_name(name)) {
     table.fail("name", "expected letters, digits, - and _: it becomes a file name");
   }
   for (const ViewConfig& view : scene.views) {
@@ -326,6 +342,7 @@ void read_fibers(const TomlTable& table, ClothConfig& cloth) {
 
 ClothConfig read_cloth(const TomlTable& table) {
   ClothConfig cloth;
+  cloth.name = read_matte_name(table);
   if (table.has("mesh") == table.has("flat_mm"))
     table.fail("mesh", "expected either mesh or flat_mm");
   if (table.has("mesh")) {
@@ -348,6 +365,60 @@ ClothConfig read_cloth(const TomlTable& table) {
     read_fibers(table, cloth);
   }
   return cloth;
+}
+
+/// Lights and the groups that they name, one without a name where none does.
+void read_lights(const TomlTable& document, SceneConfig& scene) {
+  bool any_named = false;
+  std::vector<std::string> names;  // [light]
+  for (const TomlTable& table : document.tables("light")) {
+    scene.lights.push_back(read_light(table, scene.light_files));
+    const std::string& name = names.emplace_back(table.string("group", "rest"));
+    any_named = any_named || table.has("group");
+    const bool begins_well =
+        !name.empty() && std::isalpha(static_cast<unsigned char>(name[0])) != 0;
+    if (!begins_well || !is_plain_name(name) || name.find('-') != std::string::npos) {
+      table.fail("group",
+                 "expected letters, digits and _, a letter first: it becomes the name of a layer");
+    }
+  }
+  for (std::size_t k = 0; k < names.size(); ++k) {
+    const std::string name = any_named ? names[k] : "";
+    const auto known = std::find(scene.light_groups.begin(), scene.light_groups.end(), name);
+    scene.lights[k].group = static_cast<std::uint16_t>(known - scene.light_groups.begin());
+    if (known == scene.light_groups.end()) scene.light_groups.push_back(name);
+  }
+  if (scene.light_groups.size() > kMostLightGroups)
+    document.fail("light", fmt::format("expected at most {} groups", kMostLightGroups));
+}
+
+template <std::size_t n>
+std::vector<std::string_view> names_of(const std::string_view (&names)[n]) {
+  return {std::begin(names), std::end(names)};
+}
+
+PixelFilter read_filter(const TomlTable& render) {
+  const std::string name = render.choice("filter", names_of(kFilterNames), "box");
+  const auto shape = static_cast<std::size_t>(
+      std::find(std::begin(kFilterNames), std::end(kFilterNames), name) - std::begin(kFilterNames));
+  const std::optional<double> width = render.optional_number("filter_width_px", {0.1, 16});
+  return {static_cast<FilterShape>(shape), width.value_or(kFilterWidths[shape])};
+}
+
+LayerChoice read_layers(const TomlTable& render) {
+  LayerChoice layers;
+  for (const std::string& name : render.optional_strings("layers", 1, 3)) {
+    if (name == "lobes") {
+      layers.lobes = true;
+    } else if (name == "surface") {
+      layers.surface = true;
+    } else if (name == "cryptomatte") {
+      layers.cryptomatte = true;
+    } else {
+      render.fail("layers", "expected some of lobes, surface and cryptomatte; got " + name);
+    }
+  }
+  return layers;
 }
 
 /// The camera carried about its up, through what it looks at.
@@ -414,12 +485,14 @@ SceneConfig read_scene_config(const TomlTable& document, std::optional<int> fram
   scene.name = document.string("name");
   const auto usual_frame = static_cast<int>(document.integer("frame", 0, kMostFrames, 0));
   scene.background = color(document.number3("background", kLight, std::array<double, 3>{0, 0, 0}));
-  for (const TomlTable& table : document.tables("light"))
-    scene.lights.push_back(read_light(table, scene.light_files));
+  read_lights(document, scene);
   if (scene.lights.empty()) document.fail("light", "expected at least one [[light]]");
   for (const TomlTable& table : document.tables("cloth")) scene.cloths.push_back(read_cloth(table));
   if (scene.cloths.empty()) document.fail("cloth", "expected at least one [[cloth]]");
-  for (const TomlTable& table : document.tables("mesh")) scene.meshes.push_back(read_solid(table));
+  for (const TomlTable& table : document.tables("mesh")) {
+    scene.meshes.push_back(read_solid(table));
+    scene.meshes.back().name = read_matte_name(table);
+  }
   int default_spp = 16;
   if (const std::optional<TomlTable> render = document.optional_table("render")) {
     scene.method = *render_method_of(render->choice("method", render_method_names(), "exact"));
@@ -428,6 +501,13 @@ SceneConfig read_scene_config(const TomlTable& document, std::optional<int> fram
     scene.shadow_sigma_mm = render->optional_number("shadow_sigma_mm", {0, 1e3});
     scene.bounces = static_cast<int>(render->integer("bounces", 0, 16, 0));
     scene.far_from = render->optional_number("far_from", {0, 1e6});
+    scene.filter = read_filter(*render);
+    scene.layers = read_layers(*render);
+  }
+  if (const std::optional<TomlTable> png = document.optional_table("png")) {
+    scene.look.exposure_stops = png->number("exposure_stops", {-32, 32}, 0.0);
+    if (png->choice("transform", names_of(kTransformNames), "srgb") == "filmic")
+      scene.look.transform = ScreenTransform::kFilmic;
   }
   scene.views.push_back(read_view(document.table("camera"), scene, default_spp));
   for (const TomlTable& table : document.tables("view")) {

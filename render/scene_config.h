@@ -19,9 +19,11 @@
 #include "render/lights.h"
 #include "render/mesh_file.h"
 #include "render/methods.h"
+#include "render/pixel_filter.h"
 #include "render/surface/microcylinder.h"
 #include "render/surface/paint.h"
 #include "render/surface/surface_model.h"
+#include "render/tone_map.h"
 #include "render/yarn_drift.h"
 #include "render/yarn_tints.h"
 
@@ -68,6 +70,7 @@ struct PatternConfig {
 };
 
 struct ClothConfig {
+  std::string name;              // in mattes; empty: by its number
   std::optional<MeshFile> mesh;  // an OBJ with UVs, or else a flat swatch
   double uv_size_mm = 0;         // flat cloth (mm) per unit of UV; meshes only
   FabricPlacement on_uvs;        // meshes only
@@ -114,11 +117,22 @@ struct ViewConfig {
   std::optional<ReferenceConfig> reference;
 };
 
+/// Layers of a picture that are made when asked for.
+struct LayerChoice {
+  bool lobes = false;        // reflected, transmitted
+  bool surface = false;      // albedo, N, P, UV
+  bool cryptomatte = false;  // of cloths, yarns and fibers
+
+  bool any() const { return lobes || surface || cryptomatte; }
+};
+
 struct SceneConfig {
   std::string name;
   int frame = 0;
   std::vector<ViewConfig> views;  // that of [camera] first, then every [[view]]
   std::vector<Light> lights;
+  // [Light::group] names; one without a name where no light has a group
+  std::vector<std::string> light_groups;
   std::vector<std::filesystem::path> light_files;  // pictures that the lights were read from
   Rgb background = Rgb(0, 0, 0);  // radiance seen by eye rays that hit nothing; lights nothing
   std::vector<ClothConfig> cloths;
@@ -130,6 +144,9 @@ struct SceneConfig {
   // repeats of a fabric in a pixel from which nothing but its far form is seen; none where absent
   std::optional<double> far_from;
   int bounces = 0;  // of light between folds, in methods with far forms
+  PixelFilter filter;
+  LayerChoice layers;
+  ScreenLook look;  // of the PNG
 };
 
 /// Do shapes depend on the cameras (subdivide_px)?

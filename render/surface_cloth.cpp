@@ -65,6 +65,13 @@ Mat3d SurfaceCloth::vertex_frame(std::uint32_t vertex, ClothSide side) const {
                                                                  : Vec3d(-mesh_.normals[vertex]));
 }
 
+Eigen::Vector2d SurfaceCloth::fabric_at(const SurfaceHit& hit) const {
+  Eigen::Vector2d fabric(0, 0);
+  for (std::size_t k = 0; k < 3; ++k)
+    fabric += hit.vertex_weights[k] * mesh_.fabric[hit.vertices[k]];
+  return fabric;
+}
+
 SurfaceHit SurfaceCloth::hit(std::uint32_t triangle, double u, double v, const Vec3& ray_direction,
                              double footprint_mm) const {
   const auto& [a, b, c] = mesh_.triangles[triangle];

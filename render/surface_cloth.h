@@ -55,6 +55,9 @@ class SurfaceCloth {
   /// of.
   Mat3d vertex_frame(std::uint32_t vertex, ClothSide side) const;
 
+  /// Fabric coordinates of a hit on this cloth, mm.
+  Eigen::Vector2d fabric_at(const SurfaceHit& hit) const;
+
   /// The point (1 - u - v) a + u b + v c of a triangle a, b, c, seen by a ray with that direction.
   SurfaceHit hit(std::uint32_t triangle, double u, double v, const Vec3& ray_direction,
                  double footprint_mm) const;

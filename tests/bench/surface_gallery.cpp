@@ -113,7 +113,7 @@ std::vector<std::uint8_t> picture_of(SceneConfig config,
   const FrameBuffers frame =
       shade_picture(renderer, Camera(view.camera), {0, 0, view.camera.width, view.camera.height},
                     view.spp, [](double) {});
-  return tone_map(frame.beauty, 0);
+  return tone_map(frame.beauty, {});
 }
 
 void draw_page(const std::string& scene_file, const std::string& page_file, int columns, int spp) {

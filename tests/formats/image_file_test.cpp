@@ -397,6 +397,27 @@ TEST_F(ImageFileFormat, FailedWritesNameTheTarget) {
   EXPECT_EQ(file_count(), 0u);
 }
 
+TEST_F(ImageFileFormat, APartOfAFrameKeepsItsPlace) {
+  Image image;
+  image.width = 3;
+  image.height = 2;
+  image.frame = {5, 7, 20, 10};
+  image.channels["R"] = {ChannelType::kFloat, {1, 2, 3, 4, 5, 6}, {}};
+  write_exr(folder_ / "part.exr", image);
+  const Imf::InputFile file((folder_ / "part.exr").c_str());
+  EXPECT_EQ(file.header().displayWindow(), Imath::Box2i({0, 0}, {19, 9}));
+  EXPECT_EQ(file.header().dataWindow(), Imath::Box2i({5, 7}, {7, 8}));
+  const Image read = read_exr(folder_ / "part.exr");
+  EXPECT_EQ(read.channels.at("R").values, image.channels.at("R").values);
+  EXPECT_EQ(read.frame.x0, 5);
+  EXPECT_EQ(read.frame.y0, 7);
+  EXPECT_EQ(read.frame.width, 20);
+  EXPECT_EQ(read.frame.height, 10);
+  image.frame = {};
+  write_exr(folder_ / "whole.exr", image);
+  EXPECT_EQ(read_exr(folder_ / "whole.exr").frame.width, 0);
+}
+
 TEST_F(ImageFileFormat, PngPixelsComeBack) {
   std::vector<std::uint8_t> rgb;
   for (int k = 0; k < 3 * 5 * 7; ++k) rgb.push_back(static_cast<std::uint8_t>(37 * k));
@@ -413,6 +434,27 @@ TEST_F(ImageFileFormat, PngPixelsComeBack) {
     EXPECT_NE(error_of([&] { read_png(put("cut.png", bytes.substr(0, size)), 7); }), "no error")
         << size;
   }
+}
+
+TEST_F(ImageFileFormat, PngTextComesBack) {
+  const std::vector<std::uint8_t> rgb(3 * 2 * 2, 77);
+  write_png(folder_ / "plain.png", 2, 2, rgb);
+  EXPECT_TRUE(read_png_text(folder_ / "plain.png").empty());
+  const std::map<std::string, std::string> text = {{"Software", "x"}, {"a.b", "1.5 stops"}};
+  write_png(folder_ / "t.png", 2, 2, rgb, text);
+  EXPECT_EQ(read_png_text(folder_ / "t.png"), text);
+  // Other readers see the same pixels, and no fault of a checksum.
+  EXPECT_EQ(read_png(folder_ / "t.png", 2).rgb, rgb);
+  const std::string bytes = bytes_of(folder_ / "t.png");
+  for (std::size_t size = 0; size < bytes.size(); ++size) {
+    if (size == bytes.size() - 12) continue;  // without its end, all chunks are there
+    EXPECT_NE(error_of([&] { read_png_text(put("cut.png", bytes.substr(0, size))); }), "no error")
+        << size;
+  }
+  std::string damaged = bytes;
+  damaged[damaged.find("1.5")] = '2';
+  EXPECT_NE(error_of([&] { read_png_text(put("cut.png", damaged)); }).find("a damaged text"),
+            std::string::npos);
 }
 
 TEST_F(ImageFileFormat, PngRoundTripAndEqualBytes) {

@@ -254,6 +254,7 @@ TEST(ConfigDocumentation, NamesEveryKeyOfAScene) {
   // What no scene of ours holds.
   const std::string more =
       "[[mesh]]\nmesh = \"../meshes/drape_sphere_64.obj\"\nmesh_unit = \"m\"\ngroup = \"cloth\"\n"
+      "name = \"ball\"\n"
       "[[cloth]]\nmesh = \"../meshes/drape_sphere_64.obj\"\nmesh_unit = \"m\"\ngroup = "
       "\"cloth\"\nuv_size_mm = 300\nfabric = \"../fabrics/cotton-tiny.toml\"\n"
       "[[cloth]]\nflat_mm = [1, 1]\nfabric = \"../fabrics/cotton-tiny.toml\"\nfar_surface = "

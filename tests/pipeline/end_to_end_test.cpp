@@ -4,13 +4,16 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <numeric>
 #include <set>
 #include <sstream>
 
 #include "formats/image_file.h"
+#include "formats/tensor_file.h"
 #include "pipeline/accuracy/accuracy_table.h"
 #include "pipeline/artifact_record.h"
 #include "pipeline/picture_request.h"
@@ -326,6 +329,149 @@ TEST(PicturesEndToEnd, CompareWarnsOfASharedSeed) {
   EXPECT_GE(error.at("relative_rmse").get<double>(), std::abs(mean_difference) / mean);
   const ProgramResult itself = shop.run({"compare", "exact.exr", "exact.exr"});
   EXPECT_EQ(itself.error, "") << "equal pictures are equal, whatever their seed";
+}
+
+/// The scene with two groups of lights and every layer. render: more keys of [render].
+std::string layered_scene(const std::string& render = "") {
+  return edited(edited(kSmallScene, "irradiance = [1, 1, 1]",
+                       "irradiance = [1, 1, 1]\ngroup = \"fill\""),
+                "[[cloth]]", "[[cloth]]\nname = \"swatch\"") +
+         "layers = [\"lobes\", \"surface\", \"cryptomatte\"]\n" + render +
+         "[png]\nexposure_stops = 0.5\ntransform = \"filmic\"\n";
+}
+
+/// Ids and shares of a matte's layers, as any program that knows Cryptomatte reads them.
+std::map<std::uint32_t, double> decoded(const Image& image, const std::string& layer,
+                                        std::size_t pixel) {
+  std::map<std::uint32_t, double> shares;
+  for (const char* rank : {"00", "01", "02"}) {
+    for (const auto& [id, share] : {std::pair{".R", ".G"}, std::pair{".B", ".A"}}) {
+      const ImageChannel& ids = image.channels.at(layer + rank + id);
+      const ImageChannel& coverage = image.channels.at(layer + rank + share);
+      EXPECT_EQ(ids.type, ChannelType::kFloat);
+      if (coverage.values[pixel] == 0) continue;
+      shares[std::bit_cast<std::uint32_t>(ids.values[pixel])] +=
+          static_cast<double>(coverage.values[pixel]);
+    }
+  }
+  return shares;
+}
+
+/// By the layer's name in the metadata.
+std::map<std::string, std::uint32_t> manifest_of(const Image& image, const std::string& layer) {
+  std::map<std::string, std::uint32_t> ids;
+  for (const auto& [key, value] : image.metadata) {
+    if (!key.starts_with("cryptomatte/") || !key.ends_with("/name") || value != layer) continue;
+    const std::string prefix = key.substr(0, key.size() - 4);
+    EXPECT_EQ(image.metadata.at(prefix + "hash"), "MurmurHash3_32");
+    const Json manifest = Json::parse(image.metadata.at(prefix + "manifest"));
+    for (const auto& [name, hex] : manifest.items())
+      ids[name] = static_cast<std::uint32_t>(std::stoul(hex.get<std::string>(), nullptr, 16));
+  }
+  EXPECT_FALSE(ids.empty()) << layer;
+  return ids;
+}
+
+void expect_sums_in_halves(const Image& image) {
+  const auto half = [](float value) { return float_from_half(half_from_float(value)); };
+  for (const char* color : {"R", "G", "B"}) {
+    const auto of = [&](const std::string& layer) -> const std::vector<float>& {
+      const ImageChannel& channel = image.channels.at(layer + color);
+      EXPECT_EQ(channel.type, ChannelType::kHalf);
+      return channel.values;
+    };
+    for (std::size_t k = 0; k < of("").size(); ++k) {
+      const float background = of("background.")[k];
+      ASSERT_EQ(half(background + of("C_rest.")[k] + of("C_fill.")[k]), of("")[k]);
+      ASSERT_EQ(half(background + of("single.")[k] + of("multiple.")[k]), of("")[k]);
+      ASSERT_EQ(half(of("reflected.")[k] + of("transmitted.")[k]), of("single.")[k]);
+    }
+  }
+}
+
+double mean_of(const Image& image, const std::string& channel) {
+  const std::vector<float>& values = image.channels.at(channel).values;
+  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+}
+
+TEST(LayersEndToEnd, LightGroupsAddUpAndMattesDecode) {
+  const Workshop shop;
+  std::ofstream(shop / "layers.toml") << layered_scene("filter = \"gaussian\"\n");
+  std::ofstream(shop / "plain.toml") << edited(layered_scene("filter = \"gaussian\"\n"),
+                                               "layers = [\"lobes\", \"surface\", "
+                                               "\"cryptomatte\"]\n",
+                                               "");
+  for (const char* method : {"exact", "volume", "path", "prt"}) {
+    SCOPED_TRACE(method);
+    const auto rendered = [&](const char* scene, const char* file, const char* threads) {
+      shop.report({"render", scene, "-o", file, "--method", method, "--spp", "6", "-j", threads});
+      return read_exr(shop / file);
+    };
+    const Image image = rendered("layers.toml", "a.exr", "1");
+    rendered("layers.toml", "b.exr", "2");
+    EXPECT_EQ(text_of(shop / "a.exr"), text_of(shop / "b.exr")) << "for 1 and 2 threads";
+    EXPECT_EQ(text_of(shop / "a.png"), text_of(shop / "b.png"));
+    expect_sums_in_halves(image);
+    EXPECT_GT(mean_of(image, "C_fill.G"), 0.01);
+    EXPECT_GT(mean_of(image, "transmitted.G"), 0.01);
+    EXPECT_EQ(image.metadata.at("heddle.filter"), "gaussian 2 px");
+
+    // Layers that nobody asks for do not change the others.
+    const Image plain = rendered("plain.toml", "c.exr", "2");
+    EXPECT_EQ(plain.channels.at("C_fill.R").values, image.channels.at("C_fill.R").values);
+    EXPECT_FALSE(plain.channels.contains("N.X") || plain.channels.contains("transmitted.R"));
+
+    const auto cloths = manifest_of(image, "CryptoCloth");
+    const auto yarns = manifest_of(image, "CryptoYarn");
+    const auto fibers = manifest_of(image, "CryptoFiber");
+    ASSERT_EQ(cloths.size(), 1U);
+    EXPECT_GT(yarns.size(), 2U);
+    EXPECT_GT(fibers.size(), yarns.size());
+    std::set<std::uint32_t> seen;
+    for (std::size_t k = 0; k < image.channels.at("A").values.size(); ++k) {
+      const double alpha = static_cast<double>(image.channels.at("A").values[k]);
+      const auto of_cloth = decoded(image, "CryptoCloth", k);
+      EXPECT_NEAR(alpha > 0 ? of_cloth.at(cloths.at("swatch")) : 0, alpha, 1e-3);
+      double of_yarns = 0;
+      for (const auto& [id, share] : decoded(image, "CryptoYarn", k)) {
+        of_yarns += share;
+        seen.insert(id);
+      }
+      EXPECT_NEAR(of_yarns, alpha, 1e-3) << "six samples see six yarns at most";
+    }
+    std::set<std::uint32_t> named;
+    for (const auto& [name, id] : yarns) {
+      EXPECT_TRUE(name.starts_with("swatch/warp") || name.starts_with("swatch/weft")) << name;
+      named.insert(id);
+    }
+    EXPECT_EQ(seen, named);
+  }
+  const Json png = shop.report({"info", "a.png"});
+  EXPECT_EQ(png.at("text.heddle.transform"), "filmic");
+  EXPECT_EQ(png.at("text.heddle.exposure_stops"), "0.5");
+  const Json info = shop.report({"info", "a.exr"});
+  EXPECT_NE(info.at("channel.C_fill.R").get<std::string>().find("lights of this group"),
+            std::string::npos);
+  const ProgramResult refused =
+      shop.run({"render", "layers.toml", "-o", "d.exr", "--method", "dual-scattering"});
+  EXPECT_EQ(refused.status, 2);
+  EXPECT_NE(refused.error.find("does not tell lobes apart"), std::string::npos);
+}
+
+TEST(LayersEndToEnd, ALookNeedsNoNewPicture) {
+  const Workshop shop;
+  std::ofstream(shop / "a.toml") << layered_scene();
+  shop.report({"run", "a.toml", "-o", "first.d"});
+  std::ofstream(shop / "a.toml") << edited(layered_scene(), "filmic", "srgb");
+  const Json again = shop.report({"run", "a.toml", "-o", "second.d"});
+  for (const Json& stage : again.at("stages")) {
+    if (stage.at("stage") == "picture") {
+      EXPECT_FALSE(stage.at("built").get<bool>());
+    }
+  }
+  EXPECT_EQ(text_of(shop / "first.d/a.exr"), text_of(shop / "second.d/a.exr"));
+  EXPECT_NE(text_of(shop / "first.d/a.png"), text_of(shop / "second.d/a.png"));
+  expect_sums_in_halves(read_exr(shop / "second.d/a.exr"));
 }
 
 TEST(InfoEndToEnd, ReadsWhatTheProgramReadsAndWrites) {

@@ -526,6 +526,94 @@ TEST(PathTracer, TimedPicturesAreWholePasses) {
   EXPECT_EQ(frame.spp % 2, 0);
 }
 
+TEST(PathTracerLaw, LightGroupsAreThePartsOfTheWhole) {
+  std::vector<Light> lights = {test::sg_light({-0.4F, 0.3F, 1}, 30, Rgb(3, 2, 1)),
+                               {LightType::kDirectional, Vec3(0.6F, 0, 0.8F), 0, Rgb(1, 1, 1)},
+                               test::sg_light({0.4F, 0.3F, 1}, 5, Rgb(1, 2, 3))};
+  lights[1].group = 1;
+  const World world = make_world(crossed_layers(test_cotton()), {curved_patch()}, lights);
+  // What is lit by one group alone.
+  World of_group[2] = {make_world(crossed_layers(test_cotton()), {curved_patch()}, lights),
+                       make_world(crossed_layers(test_cotton()), {curved_patch()}, lights)};
+  of_group[0].lights[1].irradiance = Rgb::Zero();
+  of_group[1].lights[0].irradiance = of_group[1].lights[2].irradiance = Rgb::Zero();
+  for (const LightEstimator estimator :
+       {LightEstimator::kShadowRays, LightEstimator::kEscapes, LightEstimator::kCombined}) {
+    PathTracerSettings settings;
+    settings.estimator = estimator;
+    settings.light_groups = 2;
+    const PathTracer apart(*world.scene, world.materials, world.lights, Rgb(1, 2, 3), settings);
+    double lit = 0;
+    for (std::uint64_t k = 0; k < 400; ++k) {
+      const Camera camera(small_camera());
+      const EyeRay ray = camera.ray(static_cast<double>(k % 24), static_cast<double>(k / 24));
+      const auto random = [&] { return RandomStream(7, RandomStage::kTest, k, 0); };
+      PathTracer::Sample groups[2];
+      RandomStream draws = random();
+      apart.trace(ray, draws, groups);
+      for (std::size_t g = 0; g < 2; ++g) {
+        RandomStream again = random();
+        const PathTracer::Sample alone = of_group[g].tracer(estimator).trace(ray, again);
+        EXPECT_TRUE(groups[g].single.isApprox(alone.single, 1e-5F) || alone.single.isZero(0));
+        EXPECT_TRUE(groups[g].multiple.isApprox(alone.multiple, 1e-5F) || alone.multiple.isZero(0));
+        EXPECT_EQ(alone.single.isZero(0), groups[g].single.isZero(0));
+      }
+      RandomStream again = random();
+      const PathTracer::Sample whole = world.tracer(estimator).trace(ray, again);
+      const PathTracer::Sample sum = sum_of_groups(groups);
+      EXPECT_LE((sum.single - whole.single).abs().maxCoeff(), 1e-5F * whole.single.maxCoeff());
+      EXPECT_LE((sum.multiple - whole.multiple).abs().maxCoeff(),
+                1e-5F * whole.multiple.maxCoeff());
+      EXPECT_EQ(sum.alpha, whole.alpha);
+      EXPECT_EQ(groups[1].alpha, 0);
+      EXPECT_EQ(sum.background[1], whole.alpha == 1 ? 0 : 2);
+      lit += static_cast<double>(groups[1].single.sum() + groups[1].multiple.sum());
+    }
+    EXPECT_EQ(lit > 0, estimator != LightEstimator::kEscapes)
+        << "no path meets a directional light";
+  }
+}
+
+TEST(PathTracerLaw, TransmittedIsWhatFibersWithoutTtDoNotShow) {
+  const World world = make_world(crossed_layers(test_cotton()), {curved_patch()},
+                                 {test::sg_light({-0.4F, 0.3F, 1}, 30, Rgb(3, 2, 1)),
+                                  {LightType::kDirectional, Vec3(0.6F, 0, 0.8F), 0, Rgb(1, 1, 1)}});
+  const std::vector<BcsdfTable> reflecting = without_transmission(world.materials);
+  for (const LightEstimator estimator : {LightEstimator::kShadowRays, LightEstimator::kCombined}) {
+    PathTracerSettings settings;
+    settings.estimator = estimator;
+    settings.limits.max_scatterings = 1;
+    const PathTracer tracer(*world.scene, world.materials, world.lights, Rgb(0, 0, 0), settings,
+                            reflecting);
+    const PathTracer only_r(*world.scene, reflecting, world.lights, Rgb(0, 0, 0), settings);
+    RunningMean left[3];
+    RunningMean expected[3];
+    for (std::uint64_t k = 0; k < 20000; ++k) {
+      RandomStream place(8, RandomStage::kTest, k, 0);
+      const EyeRay ray{Vec3d(place.uniform_double() - 0.5, place.uniform_double() - 0.5, 5),
+                       Vec3(0.1F, 0.2F, -1).normalized()};
+      RandomStream first(8, RandomStage::kTest, k, 1);
+      RandomStream second(8, RandomStage::kTest, k, 1);
+      const PathTracer::Sample all = tracer.trace(ray, first);
+      const PathTracer::Sample r = only_r.trace(ray, second);
+      for (int c = 0; c < 3; ++c) {
+        const float reflected = all.single[c] - all.transmitted[c];
+        if (estimator == LightEstimator::kShadowRays) {  // the same light is drawn
+          EXPECT_NEAR(reflected, r.single[c], 1e-5F * (1 + all.single[c]));
+        }
+        EXPECT_GE(all.transmitted[c], 0);
+        left[c].add(static_cast<double>(reflected));
+        expected[c].add(static_cast<double>(r.single[c]));
+      }
+    }
+    for (int c = 0; c < 3; ++c) {
+      EXPECT_GT(expected[c].mean(), 0.001);
+      EXPECT_TRUE(means_agree("reflected", left[c].mean(), left[c].standard_error(),
+                              expected[c].mean(), expected[c].standard_error(), 6));
+    }
+  }
+}
+
 TEST(PathTracer, BackgroundIsSeenOnlyByEyeRays) {
   World world = make_world(crossed_layers(test_cotton()), {flat_cloth(2, 2)}, {});
   PathTracerSettings settings;

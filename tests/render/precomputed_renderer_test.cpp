@@ -423,6 +423,78 @@ TEST(PrecomputedRenderer, BackgroundAndAlphaFillWhatTheClothLeaves) {
   EXPECT_GT(empty, 10);
 }
 
+TEST(PrecomputedRendererLaw, LightGroupsAreThePartsOfTheWhole) {
+  const std::vector<Light> all = {directional({0.3F, 0.2F, 1}, 1), gaussian({-1, 0, 1}, 30, 2),
+                                  gaussian({0, 1, 1}, 4, 3)};
+  const FabricPack pack = open_pack(test_cotton(), true);
+  const auto whole = make_world(pack, all, {half_roof()});
+  const auto first = make_world(pack, {all[0], all[2]}, {half_roof()});
+  const auto second = make_world(pack, {all[1]}, {half_roof()});
+  PrecomputedSettings settings;
+  const PixelRect crop = {0, 0, 20, 18};
+  const Camera camera = camera_above(5, 20, 18);
+  const auto shown = [&](const PackWorld& world) {
+    return shade_picture(world.renderer(settings), camera, crop, 6, test::no_progress);
+  };
+  const FrameBuffers alone[2] = {shown(*first), shown(*second)};
+  const FrameBuffers together = shown(*whole);
+  EXPECT_TRUE(together.light_groups.empty() && together.background.empty());
+  const PrecomputedRenderer one = first->renderer(settings);
+  const PrecomputedRenderer two(*second->scene, second->packs, second->lights, Rgb(0, 0, 0),
+                                settings);
+  const PrecomputedRenderer* groups[] = {&one, &two};
+  const FrameBuffers frame = shade_picture(groups, camera, crop, 6, test::no_progress);
+  ASSERT_EQ(frame.light_groups.size(), 2U);
+  double difference = 0;
+  for (std::size_t k = 0; k < frame.pixel_count(); ++k) {
+    Rgb sum = frame.background[k];
+    for (std::size_t g = 0; g < 2; ++g) {
+      const Rgb expected = alone[g].single[k] + alone[g].multiple[k];
+      EXPECT_LE((frame.light_groups[g].light[k] - expected).abs().maxCoeff(), 1e-6F);
+      sum += frame.light_groups[g].light[k];
+    }
+    EXPECT_LE((frame.beauty[k] - sum).abs().maxCoeff(), 1e-6F * sum.maxCoeff());
+    EXPECT_EQ(frame.alpha[k], together.alpha[k]);
+    EXPECT_EQ(frame.segment[k], together.segment[k]);
+    EXPECT_LE(
+        (frame.background[k] - (1 - frame.alpha[k]) * Rgb(0.25F, 0.5F, 0.75F)).abs().maxCoeff(),
+        1e-6F);
+    difference += static_cast<double>((frame.light_groups[1].light[k]).maxCoeff());
+  }
+  EXPECT_GT(difference, 1);
+}
+
+TEST(PrecomputedRendererLaw, TransmittedIsWhatFibersWithoutTtDoNotShow) {
+  const std::vector<Light> lights = {directional({0.3F, 0.2F, 1}, 1), gaussian({-1, 0, 1}, 30, 2),
+                                     gaussian({0, 1, 1}, 15, 3)};
+  FabricPack pack = open_pack(test_cotton(), true);
+  pack.sgs->sees_nothing.assign(pack.exemplar.segment_count(), 0);
+  pack.sgs->weights.assign(pack.exemplar.segment_count(), half_from_float(1));
+  const std::vector<BcsdfTable> reflecting = without_transmission(pack.materials);
+  const auto world = make_world(pack, lights);
+  pack.materials = reflecting;
+  const auto only_r = make_world(pack, lights);
+  const Camera camera = camera_above(1, 12, 12);
+  for (const RenderMethod method :
+       {RenderMethod::kExact, RenderMethod::kPrinted, RenderMethod::kPrt}) {
+    PrecomputedSettings settings;
+    settings.method = method;
+    const FrameBuffers expected =
+        shade_picture(only_r->renderer(settings), camera, {0, 0, 12, 12}, 2, test::no_progress);
+    settings.reflecting = {reflecting};
+    const FrameBuffers frame =
+        shade_picture(world->renderer(settings), camera, {0, 0, 12, 12}, 2, test::no_progress);
+    ASSERT_EQ(frame.transmitted.size(), frame.pixel_count());
+    double transmitted = 0;
+    for (std::size_t k = 0; k < frame.pixel_count(); ++k) {
+      const Rgb left = frame.single[k] - frame.transmitted[k];
+      EXPECT_LE((left - expected.single[k]).abs().maxCoeff(), 1e-5F * frame.single[k].maxCoeff());
+      transmitted += static_cast<double>(frame.transmitted[k].sum());
+    }
+    EXPECT_GT(transmitted, 0.1);
+  }
+}
+
 TEST(PrecomputedRenderer, ALowerOrderIsThatOfDataCutToIt) {
   FabricPack pack = open_pack(test_cotton());
   Transfer& transfer = *pack.transfer;

@@ -108,6 +108,47 @@ TEST_F(SceneConfigTest, ReadsEveryKey) {
   EXPECT_NEAR(scene.background[1], 0.2, 1e-7);
 }
 
+TEST_F(SceneConfigTest, LayersFilterAndScreen) {
+  const SceneConfig plain = read(kScene);
+  EXPECT_EQ(plain.light_groups, std::vector<std::string>{""});
+  EXPECT_TRUE(plain.filter.is_default());
+  EXPECT_FALSE(plain.layers.any());
+  EXPECT_EQ(plain.look, ScreenLook{});
+  EXPECT_EQ(plain.cloths[0].name, "");
+
+  const std::string more = with(
+      with(with(kScene, "irradiance = [4, 5, 6]", "irradiance = [4, 5, 6]\ngroup = \"fill_2\""),
+           "underlay = true", "underlay = true\nname = \"shirt-1\""),
+      "mesh_unit = \"cm\"", "mesh_unit = \"cm\"\nname = \"ball\"");
+  const SceneConfig scene =
+      read(more +
+           "filter = \"gaussian\"\nfilter_width_px = 1.5\nlayers = [\"lobes\", \"cryptomatte\"]\n"
+           "[png]\nexposure_stops = -1.5\ntransform = \"filmic\"\n");
+  EXPECT_EQ(scene.light_groups, (std::vector<std::string>{"rest", "fill_2"}));
+  EXPECT_EQ(scene.lights[0].group, 0);
+  EXPECT_EQ(scene.lights[1].group, 1);
+  EXPECT_EQ(scene.filter.text(), "gaussian 1.5 px");
+  EXPECT_TRUE(scene.layers.lobes && scene.layers.cryptomatte && !scene.layers.surface);
+  EXPECT_EQ(scene.look.exposure_stops, -1.5);
+  EXPECT_EQ(scene.look.transform, ScreenTransform::kFilmic);
+  EXPECT_EQ(scene.cloths[0].name, "shirt-1");
+  EXPECT_EQ(scene.meshes[0].name, "ball");
+  EXPECT_EQ(read(kScene + "filter = \"blackman-harris\"\n").filter.text(), "blackman-harris 3 px");
+
+  EXPECT_NE(message(kScene + "filter = \"mitchell\"\n").find("box"), std::string::npos);
+  EXPECT_NE(message(kScene + "layers = [\"depth\"]\n").find("got depth"), std::string::npos);
+  for (const char* group : {"", "2nd", "a b", "a-b"}) {
+    EXPECT_NE(message(with(kScene, "irradiance = [4, 5, 6]",
+                           "irradiance = [4, 5, 6]\ngroup = \"" + std::string(group) + "\""))
+                  .find("a letter first"),
+              std::string::npos)
+        << group;
+  }
+  EXPECT_NE(message(with(kScene, "underlay = true", "underlay = true\nname = \"a/b\""))
+                .find("becomes the name of a matte"),
+            std::string::npos);
+}
+
 TEST_F(SceneConfigTest, Defaults) {
   const SceneConfig scene = read(kScene.substr(0, kScene.find("[render]")));
   EXPECT_EQ(scene.method, RenderMethod::kExact);
