@@ -32,7 +32,7 @@ const std::vector<PaintConfig> kPaints = {
     glossy({0.2, 0.5, 0.9}, 0.05, Rgbd::Constant(0.04)), glossy(Rgbd::Zero(), 0.4, {0.9, 0.7, 0.3}),
     glossy({1, 1, 1}, 1, {0.5, 0.5, 0.5})};
 
-const Vec3 kViews[] = {{.3F, -.1F, 1}, {-.2F, .9F, .2F}, {.99F, -.05F, .06F}};
+const Vec3 kPaintViews[] = {{.3F, -.1F, 1}, {-.2F, .9F, .2F}, {.99F, -.05F, .06F}};
 
 /// Mean and standard error of what is reflected of even light, by the paint's own draws.
 RunningMean albedo(const Paint& paint, const Vec3& wo, int channel, int draws) {
@@ -51,7 +51,7 @@ TEST(PaintLaw, FurnaceReturnsAllLightOfWhiteAndNeverMore) {
     for (const double reflectance : {0.0, 0.04, 0.5, 1.0}) {
       const Paint white(glossy(Rgbd::Ones(), roughness, Rgbd::Constant(reflectance)));
       const Paint bare(glossy(Rgbd::Zero(), roughness, Rgbd::Constant(reflectance)));
-      for (const Vec3& view : kViews) {
+      for (const Vec3& view : kPaintViews) {
         const Vec3 wo = view.normalized();
         const RunningMean all = albedo(white, wo, 0, 20'000);
         EXPECT_NEAR(all.mean(), 1, 1e-3 + 5 * all.standard_error())
@@ -104,12 +104,13 @@ TEST(PaintLaw, AThinGlossReflectsAsSchlickSays) {
 }
 
 TEST(PaintStatistical, SamplesFollowTheDensity) {
-  const int tests = static_cast<int>(kPaints.size() * std::size(kViews));
+  const int tests = static_cast<int>(kPaints.size() * std::size(kPaintViews));
   for (const PaintConfig& config : kPaints) {
     const Paint paint(config);
-    for (const Vec3& view : kViews) {
+    for (const Vec3& view : kPaintViews) {
       const Vec3 wo = view.normalized();
-      RandomStream random(3, RandomStage::kTest, static_cast<std::uint64_t>(&view - kViews), 0);
+      RandomStream random(3, RandomStage::kTest, static_cast<std::uint64_t>(&view - kPaintViews),
+                          0);
       AngleWindow window;  // the upper hemisphere; nothing drawn counts as below
       window.phi_min = 0;
       window.phi_max = kPi;
