@@ -1,7 +1,7 @@
 #ifndef HEDDLE_PIPELINE_CONTACT_SHEET_H_
 #define HEDDLE_PIPELINE_CONTACT_SHEET_H_
 // The frames of a sequence side by side in one small picture, each with its number. Tested in
-// tests/pipeline/contact_sheet_test.cpp.
+// tests/pipeline/sequence_test.cpp.
 
 #include <filesystem>
 #include <vector>
