@@ -68,7 +68,7 @@ void TransferShading::shade(const GBuffer& g_buffer, const LightVisibility& visi
         if (reflecting_) {
           const Rgb reflected =
               weight * light.irradiance * scattered_once(*reflecting_, point, light, axis);
-          sample.transmitted += (single - reflected).max(0.0F);
+          sample.transmitted += single - reflected;
         }
       }
       if (!visible.nearby) continue;

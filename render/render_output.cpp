@@ -124,8 +124,8 @@ AddedColors added_colors(const FrameBuffers& frame) {
       for (std::size_t g = 0; g < colors.light_groups.size(); ++g)
         colors.light_groups[g][k][c] = lights[1 + g];
       if (colors.transmitted.empty()) continue;
-      std::array<float, 2> lobes = {std::max(0.0F, parts[1] - colors.transmitted[k][c]),
-                                    colors.transmitted[k][c]};
+      std::array<float, 2> lobes = {frame.single[k][c] - frame.transmitted[k][c],
+                                    frame.transmitted[k][c]};
       round_parts(parts[1], lobes);
       colors.reflected[k][c] = lobes[0];
       colors.transmitted[k][c] = lobes[1];

@@ -477,6 +477,7 @@ TEST(PrecomputedRendererLaw, TransmittedIsWhatFibersWithoutTtDoNotShow) {
   const Camera camera = camera_above(1, 12, 12);
   for (const RenderMethod method :
        {RenderMethod::kExact, RenderMethod::kPrinted, RenderMethod::kPrt}) {
+    SCOPED_TRACE(render_method_name(method));
     PrecomputedSettings settings;
     settings.method = method;
     const FrameBuffers expected =
