@@ -106,6 +106,9 @@ void round_to_add_up(float& whole, std::span<const std::span<float>> sets) {
 
 void round_parts(float whole, std::span<float> parts) {
   for (float& part : parts) part = rounded_to_half(part);
+  if (settle(whole, parts, 0)) return;
+  // Parts of both signs, much larger than the whole, are too coarse for it.
+  for (float& part : parts) part = std::clamp(part, std::min(0.0F, whole), std::max(0.0F, whole));
   settle(whole, parts, 0);
 }
 

@@ -22,7 +22,8 @@ bool add_up(std::span<const float> parts, float whole);
 /// parts nearly cancel each other, all are rounded to the coarser digits of the largest instead.
 void round_to_add_up(float& whole, std::span<const std::span<float>> sets);
 
-/// The same for parts of a value that is rounded already and stays.
+/// The same for parts of a value that is rounded already and stays. Where parts nearly cancel each
+/// other, they are cut to between 0 and the whole.
 void round_parts(float whole, std::span<float> parts);
 
 }  // namespace heddle
