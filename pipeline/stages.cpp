@@ -42,8 +42,8 @@ constexpr std::uint32_t kForecastProbes = 24;
 int version_of(std::string_view stage) {
   static const std::map<std::string_view, int> versions = {
       {"geometry", 1},        {"synth", 3},    {"maps", 3}, {"ssdf", 1},     {"sg", 1},
-      {"transfer", 5},        {"voxelize", 2}, {"pack", 1}, {"accuracy", 8}, {"surface-maps", 1},
-      {"surface-weights", 2}, {"far", 1},
+      {"transfer", 5},        {"voxelize", 2}, {"pack", 1}, {"accuracy", 9}, {"surface-maps", 1},
+      {"surface-weights", 2}, {"far", 2},
   };
   return versions.at(stage);
 }

@@ -347,7 +347,7 @@ std::vector<Warning> picture_warnings(const PictureSetup& setup) {
       warnings.push_back({"behind",
                           fmt::format("{} lies within {:g} degrees of the plane of {} of the cloth "
                                       "in the picture, whose data hold light "
-                                      "from both sides: harmonics see it on both sides",
+                                      "from both sides: there it fades faster than harmonics tell",
                                       name, kPlaneDegrees, percent(share(probe.in_plane[l]))),
                           0.15, "light_from = \"face\", or --method path"});
     }

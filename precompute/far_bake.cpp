@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "fibers/baked/cone_scattering.h"
-#include "fibers/math/hemisphere_dual.h"
+#include "fibers/math/light_dual.h"
 #include "fibers/math/random.h"
 #include "fibers/math/sh_rotation.h"
 #include "fibers/math/spherical_harmonics.h"
@@ -126,8 +126,12 @@ class FarBaker {
     const auto n = static_cast<std::size_t>(table.coefficients());
     projected_.resize(lights_ * n);
     for (std::uint32_t l = 0; l < lights_; ++l) {
-      evaluate_sh(table.order, light_[l], &projected_[l * n]);
-      if (!table.both_sides) HemisphereDual::of_order(table.order).apply(&projected_[l * n]);
+      if (table.both_sides) {
+        two_sided_moments(table.order, light_[l], &projected_[l * n]);
+      } else {
+        evaluate_sh(table.order, light_[l], &projected_[l * n]);
+      }
+      LightDual::of(table.order, table.both_sides).apply(&projected_[l * n]);
     }
   }
 

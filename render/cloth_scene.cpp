@@ -78,8 +78,8 @@ ClothScene::ClothScene(std::vector<ClothPiece> pieces, std::vector<TriangleMesh>
                                                         thickness(piece.tiling)));
           std::optional<YarnTints> tints;
           if (piece.yarn_tint) tints.emplace(piece.tiling, *piece.yarn_tint);
-          cloths.push_back(
-              {std::move(piece.tiling), std::move(shell), first_part, std::move(tints)});
+          cloths.push_back({std::move(piece.tiling), std::move(shell), first_part, std::move(tints),
+                            piece.underlay});
         }
         return cloths;
       }()),

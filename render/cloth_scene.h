@@ -112,6 +112,8 @@ class ClothScene {
   /// material_offset(part) + its own.
   std::uint16_t material_offset(std::uint32_t part) const { return parts_[part].material_offset; }
   std::vector<FiberScattering> materials() const { return materials_; }
+  /// Does a black copy of the underside lie below the cloth? Then no light comes from there.
+  bool has_underlay(std::uint32_t cloth) const { return cloths_[cloth].has_underlay; }
   bool has_tints(std::uint32_t part) const { return cloths_[parts_[part].cloth].tints.has_value(); }
   /// Factor of the scattering of the yarn at a hit; 1 where the cloth has no tints.
   Rgb tint(const ShellHit& hit) const {
@@ -214,6 +216,7 @@ class ClothScene {
     Shell shell;
     std::uint32_t first_part;
     std::optional<YarnTints> tints;
+    bool has_underlay;
   };
   struct Part {
     std::uint32_t cloth;

@@ -44,13 +44,15 @@ FarLadder::Means FarLadder::mean_over(std::size_t width) const {
     std::uint32_t light;
     float weight;
   };
+  std::vector<Vec3> directions;
+  for (std::uint32_t l = 0; l < from.count(); ++l) directions.push_back(from.direction(l));
   std::vector<Tap> taps;
   std::vector<std::size_t> first = {0};  // [axis]
   for (std::uint32_t axis = 0; axis < means.grid.count(); ++axis) {
     const Vec3 middle = means.grid.direction(axis);
     float all = 0;
     for (std::uint32_t l = 0; l < from.count(); ++l) {
-      const float weight = std::exp(sharpness * (from.direction(l).dot(middle) - 1));
+      const float weight = std::exp(sharpness * (directions[l].dot(middle) - 1));
       if (weight < kTail) continue;
       all += weight;
       if (l < table_->light_count()) taps.push_back({l, weight});
@@ -156,9 +158,9 @@ Rgb FarForm::single(const View& view, const Vec3& axis, std::optional<float> sha
 
 Rgb FarForm::multiple(const View& view, const Vec3& axis, std::optional<float> sharpness,
                       const float* c_light) const {
-  using FaceLight = MultipleScattering::LightShape::FaceLight;
+  using Projection = MultipleScattering::LightShape::Projection;
   const float share =
-      cones_ ? MultipleScattering::LightShape::on_cones_of(sharpness, FaceLight::kDual).share : 0;
+      cones_ ? MultipleScattering::LightShape::on_cones_of(sharpness, Projection::kDual).share : 0;
   Rgb sum = Rgb::Zero();
   for (int j = 0; j < table_->coefficients(); ++j) {
     for (int c = 0; c < 3; ++c) {

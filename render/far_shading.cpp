@@ -3,7 +3,7 @@
 #include <array>
 #include <optional>
 
-#include "fibers/math/hemisphere_dual.h"
+#include "fibers/math/light_dual.h"
 
 namespace heddle {
 
@@ -49,7 +49,7 @@ void FarShading::add(const Seen& seen, const SeenLight& light,
     shape->project(table.order, table.both_sides, axis, c_light.data());
   } else {
     near_shapes_->moments(table.order, table.both_sides, sharpness, axis, c_light.data());
-    if (!table.both_sides) HemisphereDual::of_order(table.order).apply(c_light.data());
+    LightDual::of(table.order, table.both_sides).apply(c_light.data());
   }
   sum.multiple +=
       light.irradiance * seen.form->multiple(seen.view, axis, sharpness, c_light.data());

@@ -13,19 +13,14 @@ ClothScene::Passing FarWay::pass(std::uint32_t cloth, const ShellInterval& inter
       (scene_->shell(cloth).fabric_from_world(interval.tet) * -ray_->direction).normalized();
   if (!sees_far(table, wo, interval.t0)) return kLook;
   const DirectionGrid::Place place = table.grid().place(wo);
-  const auto mean = [&](const std::vector<float>& of_view) {
-    float sum = 0;
-    for (std::size_t i = 0; i < 4; ++i) sum += place.shares[i] * of_view[place.cells[i]];
-    return sum;
-  };
-  const double height = mean(table.height);
+  const double height = place.mean(table.height);
   const double from = interval.fabric0.z() - height;
   const double to = interval.fabric1.z() - height;
   if (from * to > 0 || from == to || (from > 0) != (wo.z() > 0)) return kSkip;
   const double s = from / (from - to);
   const double t = interval.t0 + s * (interval.t1 - interval.t0);
   constexpr float kLeast = 0.01F;  // less than that is not followed
-  float weight = left_ * mean(table.coverage);
+  float weight = left_ * place.mean(table.coverage);
   if (left_ - weight < kLeast) weight = left_;
   left_ -= weight;
   const ShellHit hit{cloth,

@@ -4,6 +4,7 @@
 // light, so one G-buffer serves any lighting of the same view. Eye rays are those of the path
 // tracer with the same seed. Tested in tests/render/precomputed_renderer_test.cpp.
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -81,6 +82,21 @@ struct GBuffer {
   /// Random numbers of one sample, stratified over the samples of its pixel. They are addressed by
   /// the pixel of the whole picture, so they depend neither on the crop nor on the block.
   RandomStream random(std::uint64_t seed, RandomStage stage, std::uint32_t sample) const;
+};
+
+/// A picture of a crop in blocks of kBlockEdge x kBlockEdge pixels, row by row; those at the right
+/// and below may be smaller.
+struct PictureBlocks {
+  PixelRect crop;
+
+  int columns() const { return (crop.width + kBlockEdge - 1) / kBlockEdge; }
+  int count() const { return columns() * ((crop.height + kBlockEdge - 1) / kBlockEdge); }
+  PixelRect at(int index) const {
+    const int left = index % columns() * kBlockEdge;  // within the crop
+    const int top = index / columns() * kBlockEdge;
+    return {crop.x0 + left, crop.y0 + top, std::min(kBlockEdge, crop.width - left),
+            std::min(kBlockEdge, crop.height - top)};
+  }
 };
 
 /// Where pixel `pixel` of a block, row by row, lies in a picture of the crop.

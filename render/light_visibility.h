@@ -46,8 +46,8 @@ class LightVisibilityPass {
  public:
   /// What visibility depends on of one part of the scene.
   struct Part {
-    bool light_from_both_sides;
-    double shadow_sigma_mm;  // deviation of the Gaussian along the cloth
+    bool light_from_both_sides;  // data for it, and nothing below that keeps it away
+    double shadow_sigma_mm;      // deviation of the Gaussian along the cloth
   };
   /// parts: [part of the scene]. lights: no environments. The scene and the lights
   /// outlive the object. draw_directions: LightVisibility::direction is wanted.

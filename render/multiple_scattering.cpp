@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "fibers/baked/cone_scattering.h"
-#include "fibers/math/hemisphere_dual.h"
+#include "fibers/math/light_dual.h"
 #include "fibers/math/sh_rotation.h"
 #include "fibers/math/special_functions.h"
 #include "fibers/math/spherical_gaussian.h"
@@ -27,33 +27,34 @@ constexpr float kConesAlone = 20;
 }  // namespace
 
 MultipleScattering::LightShape::OnCones MultipleScattering::LightShape::on_cones_of(
-    std::optional<float> sharpness, FaceLight face_light) {
+    std::optional<float> sharpness, Projection projection) {
   OnCones on_cones;
-  if (face_light == FaceLight::kPrinted) on_cones.share = 0;
+  if (projection == Projection::kPrinted) on_cones.share = 0;
   if (!sharpness) return on_cones;
   on_cones.share *= std::clamp((*sharpness - kConesFrom) / (kConesAlone - kConesFrom), 0.0F, 1.0F);
   on_cones.variance = 1 / std::max(*sharpness, kConesFrom);
   return on_cones;
 }
 
-MultipleScattering::LightShape::LightShape(std::optional<float> sharpness, FaceLight face_light)
+MultipleScattering::LightShape::LightShape(std::optional<float> sharpness, Projection projection)
     : directional_(!sharpness),
-      face_light_(face_light),
-      on_cones_(on_cones_of(sharpness, face_light)) {
+      projection_(projection),
+      on_cones_(on_cones_of(sharpness, projection)) {
   band_.fill(1);
   if (!sharpness) return;
   const std::vector<double> ratios = spherical_bessel_ratios(kMaxShOrder, *sharpness);
   std::transform(ratios.begin(), ratios.end(), band_.begin(),
                  [](double a) { return static_cast<float>(a); });
 
-  constexpr int kCount = sh_count(kMaxShOrder);
-  upper_.assign(static_cast<std::size_t>(kInclinations) * kCount, 0.0F);
-  std::array<double, kCount> y;
+  upper_.assign(static_cast<std::size_t>(kInclinations) * kColumns, 0.0F);
+  std::vector<float> rooted(upper_.size(), 0.0F);  // the same with sqrt(z)
+  std::array<double, kColumns> y;
   for (int row = 0; row < kInclinations; ++row) {
     const double inclination = kPi * row / (kInclinations - 1);
     const Vec3d axis(std::sin(inclination), 0, std::cos(inclination));
     const Vec3d side(std::cos(inclination), 0, -std::sin(inclination));
-    std::array<double, kCount> sum{};
+    std::array<double, kColumns> sum{};
+    std::array<double, kColumns> rooted_sum{};
     for (int p = 0; p < kPolar; ++p) {
       const double cosine = 1 - sg_depth_of_share((p + 0.5) / kPolar, *sharpness);
       const double sine = std::sqrt(std::max(0.0, 1 - cosine * cosine));
@@ -63,29 +64,53 @@ MultipleScattering::LightShape::LightShape(std::optional<float> sharpness, FaceL
             cosine * axis + sine * (std::cos(azimuth) * side + std::sin(azimuth) * Vec3d(0, 1, 0));
         if (w.z() <= 0) continue;
         evaluate_sh(kMaxShOrder, w, y.data());
-        for (int j = 0; j < kCount; ++j)
-          sum[static_cast<std::size_t>(j)] += y[static_cast<std::size_t>(j)];
+        const double root = std::sqrt(w.z());
+        for (std::size_t j = 0; j < y.size(); ++j) {
+          sum[j] += y[j];
+          rooted_sum[j] += root * y[j];
+        }
       }
     }
     for (int l = 0; l <= kMaxShOrder; ++l) {
       for (int m = 0; m <= l; ++m) {
-        const int j = l * (l + 1) + m;
-        upper_[static_cast<std::size_t>(row * kCount + j)] =
-            static_cast<float>(sum[static_cast<std::size_t>(j)] / (kPolar * kAzimuths));
+        const auto j = static_cast<std::size_t>(l * (l + 1) + m);
+        const std::size_t place = static_cast<std::size_t>(row) * kColumns + j;
+        upper_[place] = static_cast<float>(sum[j] / (kPolar * kAzimuths));
+        rooted[place] = static_cast<float>(rooted_sum[j] / (kPolar * kAzimuths));
       }
     }
+  }
+  fill_both(rooted);
+}
+
+void MultipleScattering::LightShape::fill_both(const std::vector<float>& rooted) {
+  both_.resize(rooted.size());
+  for (std::size_t row = 0; row < kInclinations; ++row) {
+    // What lies below is what lies above of the mirrored axis.
+    std::array<float, kColumns> below{};
+    const float* mirrored = rooted.data() + (kInclinations - 1 - row) * kColumns;
+    for (int l = 0; l <= kMaxShOrder; ++l) {
+      for (int m = 0; m <= l; ++m) {
+        const int j = l * (l + 1) + m;
+        below[static_cast<std::size_t>(j)] = (l + m) % 2 == 0 ? mirrored[j] : -mirrored[j];
+      }
+    }
+    two_sided_moments(kMaxShOrder, rooted.data() + row * kColumns, below.data(),
+                      both_.data() + row * kColumns);
   }
 }
 
 void MultipleScattering::LightShape::moments(int order, bool both_sides, const Vec3& axis,
                                              float* moments) const {
-  if (both_sides || face_light_ == FaceLight::kPrinted) {
+  if (projection_ == Projection::kPrinted) {
     evaluate_sh(order, axis, moments);
     for (int l = 0; l <= order; ++l) {
       for (int m = -l; m <= l; ++m) moments[l * (l + 1) + m] *= band_[static_cast<std::size_t>(l)];
     }
   } else if (!directional_) {
-    moments_above(order, axis, moments);
+    moments_by_inclination(both_sides ? both_ : upper_, order, axis, moments);
+  } else if (both_sides) {
+    two_sided_moments(order, axis, moments);
   } else if (axis.z() > 0) {
     evaluate_sh(order, axis, moments);
   } else {
@@ -96,17 +121,17 @@ void MultipleScattering::LightShape::moments(int order, bool both_sides, const V
 void MultipleScattering::LightShape::project(int order, bool both_sides, const Vec3& axis,
                                              float* coefficients) const {
   moments(order, both_sides, axis, coefficients);
-  if (!both_sides && face_light_ == FaceLight::kDual)
-    HemisphereDual::of_order(order).apply(coefficients);
+  if (projection_ == Projection::kDual) LightDual::of(order, both_sides).apply(coefficients);
 }
 
-void MultipleScattering::LightShape::moments_above(int order, const Vec3& axis,
-                                                   float* moments) const {
+void MultipleScattering::LightShape::moments_by_inclination(const std::vector<float>& table,
+                                                            int order, const Vec3& axis,
+                                                            float* moments) {
   const float place = std::acos(std::clamp(axis.z(), -1.0F, 1.0F)) * (kInclinations - 1) / kPif;
   const int row = std::min(static_cast<int>(place), kInclinations - 2);
   const float share = place - static_cast<float>(row);
-  const float* low = upper_.data() + static_cast<std::ptrdiff_t>(row) * sh_count(kMaxShOrder);
-  const float* high = low + sh_count(kMaxShOrder);
+  const float* low = table.data() + static_cast<std::ptrdiff_t>(row) * kColumns;
+  const float* high = low + kColumns;
   // The axis' azimuth: cos and sin of its multiples by recurrence.
   const float across = std::hypot(axis.x(), axis.y());
   const float c1 = across > 0 ? axis.x() / across : 1.0F;
@@ -166,14 +191,14 @@ Rgb MultipleScattering::add(const SeenLight& light, const Vec3& axis, const Ligh
     for (std::size_t j = 0; j < static_cast<std::size_t>(n); ++j)
       sum.all[c][j] += irradiance * values[j];
   }
-  const LightShape::OnCones on_cones = LightShape::on_cones_of(sharpness, shapes.face_light());
+  const LightShape::OnCones on_cones = LightShape::on_cones_of(sharpness, shapes.projection());
   if (!transfer_->cones || !(on_cones.share > 0)) return Rgb::Zero();
   for (std::size_t c = 0; c < 3; ++c) {
     const float irradiance = on_cones.share * light.irradiance[static_cast<Eigen::Index>(c)];
     for (std::size_t j = 0; j < static_cast<std::size_t>(n); ++j)
       sum.on_cones[c][j] += irradiance * values[j];
   }
-  if (!transfer_->both_sides) HemisphereDual::of_order(transfer_->order).apply(values.data());
+  LightDual::of(transfer_->order, transfer_->both_sides).apply(values.data());
   CellLight arriving;
   transfer_->incoming_on_cones(point.cell, values.data(), arriving.cones.data());
   return light.irradiance * outgoing_from_cones(arriving, on_cones, axis, point.segment,
@@ -183,30 +208,29 @@ Rgb MultipleScattering::add(const SeenLight& light, const Vec3& axis, const Ligh
 
 void MultipleScattering::incoming(std::uint32_t cell, const LightShapes& shapes,
                                   const SummedLight& sum, IncomingField& field) const {
-  const bool by_dual =
-      !transfer_->both_sides && shapes.face_light() == LightShape::FaceLight::kDual;
+  const bool by_dual = shapes.projection() == LightShape::Projection::kDual;
   const auto in_colors = [&](const std::array<std::array<float, SummedLight::kMost>, 3>& planes) {
     IncomingField light;  // [j0][rgb]
     for (std::size_t c = 0; c < 3; ++c) {
       std::array<float, SummedLight::kMost> values = planes[c];
-      if (by_dual) HemisphereDual::of_order(transfer_->order).apply(values.data());
+      if (by_dual) LightDual::of(transfer_->order, transfer_->both_sides).apply(values.data());
       for (int j = 0; j < transfer_->coefficients(); ++j)
         light[static_cast<std::size_t>(3 * j) + c] = values[static_cast<std::size_t>(j)];
     }
     return light;
   };
   transfer_->add_incoming(cell, in_colors(sum.all).data(), field.data());
-  if (transfer_->cones && shapes.face_light() == LightShape::FaceLight::kDual)
+  if (transfer_->cones && shapes.projection() == LightShape::Projection::kDual)
     transfer_->subtract_incoming_of_cones(cell, in_colors(sum.on_cones).data(), field.data());
 }
 
-LightShapes::LightShapes(LightShape::FaceLight face_light)
-    : face_light_(face_light), directional_(std::nullopt, face_light) {}
+LightShapes::LightShapes(LightShape::Projection projection)
+    : projection_(projection), directional_(std::nullopt, projection) {}
 
 const LightShapes::LightShape& LightShapes::at(std::size_t k) const {
   Late& late = shapes_[k];
   std::call_once(late.once, [&] {
-    late.shape.emplace(kLeast * std::exp2(static_cast<float>(k) / kPerOctave), face_light_);
+    late.shape.emplace(kLeast * std::exp2(static_cast<float>(k) / kPerOctave), projection_);
   });
   return *late.shape;
 }

@@ -13,12 +13,11 @@
 // slightly negative. Signs are kept, so that sums over samples have the expansion's mean. Whoever
 // shows a picture may clamp it.
 //
-// With light from the face only, the transfer is known, and used, above the horizon only. Its
-// stored coefficients are moments over the upper hemisphere. Light is projected onto their dual
-// (fibers/math/hemisphere_dual.h): c_light = G^+ integral over z > 0 of L Y_j. The printed form
-// takes them for coefficients of a function that is 0 below the horizon. That loses light near it:
-// 13 % on flat gabardine under light at 70 degrees. An odd continuation below the horizon is
-// better, the dual better still (docs/performance.md).
+// The transfer's stored coefficients are moments of a response to light: over the upper hemisphere
+// with light from the face only, else over the sphere. Light is projected onto their dual
+// (fibers/math/light_dual.h). The printed form takes moments for coefficients, and the response for
+// 0 below the horizon. That loses light near it, 13 % on flat gabardine under light at 70 degrees,
+// and lets light from both sides leak through the cloth's plane (docs/decisions.md).
 //
 // A transfer may keep light on cones apart (fibers/baked/cone_transfer.h). It is then taken out of
 // the harmonics and scattered on its own, per light (fibers/baked/cone_scattering.h). Lights that
@@ -74,17 +73,16 @@ class MultipleScattering {
                      std::span<const Vec3> bundle_tangent = {})
       : transfer_(&transfer), materials_(materials), bundle_tangent_(bundle_tangent) {}
 
-  /// A light's shape, computed once for all samples. For light from both sides it is the band
-  /// factors A_l. For light from the face it is a table of the moments over the upper hemisphere by
-  /// the inclination of the axis. Without a sharpness: directional.
+  /// A light's shape, computed once for all samples: tables of its moments by the inclination of
+  /// its axis, and for the printed form the band factors A_l. Without a sharpness: directional.
   class LightShape {
    public:
-    /// How light is projected where the fabric takes it from its face only.
-    enum class FaceLight : std::uint8_t {
-      kDual,     // onto the dual of the moments over the upper hemisphere
-      kPrinted,  // as from both sides
+    /// How light is projected.
+    enum class Projection : std::uint8_t {
+      kDual,     // onto the dual of the moments
+      kPrinted,  // onto the harmonics
     };
-    explicit LightShape(std::optional<float> sharpness, FaceLight face_light = FaceLight::kDual);
+    explicit LightShape(std::optional<float> sharpness, Projection projection = Projection::kDual);
 
     /// How light that stays on cones is scattered.
     struct OnCones {
@@ -94,28 +92,33 @@ class MultipleScattering {
       float share = 1;
       float variance = 0;  // that the light's own width adds to a cone's
     };
-    static OnCones on_cones_of(std::optional<float> sharpness, FaceLight face_light);
+    static OnCones on_cones_of(std::optional<float> sharpness, Projection projection);
     OnCones on_cones() const { return on_cones_; }
 
     /// Moments of a light about `axis` over the directions that the transfer knows:
-    /// [sh_count(order)]. From the face and not as printed, the dual makes c_light of them.
+    /// [sh_count(order)]. If not as printed, the dual makes c_light of them.
     void moments(int order, bool both_sides, const Vec3& axis, float* moments) const;
     /// c_light for a light about `axis` (unit, fabric space): [sh_count(order)].
     void project(int order, bool both_sides, const Vec3& axis, float* coefficients) const;
 
    private:
-    // Rows of upper_, for axis inclinations from +z in equal steps. Between them, interpolation is
+    // Rows of a table, for axis inclinations from +z in equal steps. Between them, interpolation is
     // linear, with an error below 2e-3 of the largest coefficient (measured by its test).
     static constexpr int kInclinations = 129;
-    /// Integrals over z > 0 of the normalised Gaussian about `axis` times Y_j: [sh_count(order)].
-    void moments_above(int order, const Vec3& axis, float* moments) const;
+    static constexpr int kColumns = sh_count(kMaxShOrder);
+    /// rooted: integrals over z > 0 of the light times sqrt(z) Y_j, laid out like the tables.
+    void fill_both(const std::vector<float>& rooted);
+    /// Row of a table for `axis`, turned to its azimuth: [sh_count(order)].
+    static void moments_by_inclination(const std::vector<float>& table, int order, const Vec3& axis,
+                                       float* moments);
 
     bool directional_;
-    FaceLight face_light_;
+    Projection projection_;
     OnCones on_cones_;
     std::array<float, kMaxShOrder + 1> band_;  // [l]
     // [inclination][j] of a light whose axis lies in the xz plane; m < 0 are 0
-    std::vector<float> upper_;
+    std::vector<float> upper_;  // integrals over z > 0 of the normalised Gaussian times Y_j
+    std::vector<float> both_;   // two_sided_moments of it
   };
 
   /// What a light about `axis` (unit, fabric space) sends to `cell`.
@@ -157,9 +160,9 @@ class MultipleScattering {
 class LightShapes {
  public:
   using LightShape = MultipleScattering::LightShape;
-  explicit LightShapes(LightShape::FaceLight face_light);
+  explicit LightShapes(LightShape::Projection projection);
 
-  LightShape::FaceLight face_light() const { return face_light_; }
+  LightShape::Projection projection() const { return projection_; }
   /// Without a sharpness: directional. Sharpnesses are clamped to kLeast .. kMost.
   void moments(int order, bool both_sides, std::optional<float> sharpness, const Vec3& axis,
                float* moments) const;
@@ -176,7 +179,7 @@ class LightShapes {
   };
   const LightShape& at(std::size_t k) const;
 
-  LightShape::FaceLight face_light_;
+  LightShape::Projection projection_;
   LightShape directional_;
   mutable std::array<Late, kCount> shapes_;
 };

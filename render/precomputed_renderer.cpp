@@ -74,8 +74,9 @@ std::vector<LightVisibilityPass::Part> visibility_parts(const ClothScene& scene,
                                                         std::optional<double> shadow_sigma_mm) {
   std::vector<LightVisibilityPass::Part> parts;
   for (std::uint32_t part = 0; part < packs.size(); ++part) {
-    const Shell& shell = scene.shell(scene.cloth_of_part(part));
-    parts.push_back({packs[part]->light_from_both_sides,
+    const std::uint32_t cloth = scene.cloth_of_part(part);
+    const Shell& shell = scene.shell(cloth);
+    parts.push_back({packs[part]->light_from_both_sides && !scene.has_underlay(cloth),
                      shadow_sigma_mm.value_or(shell.z_max() - shell.z_min())});
   }
   return parts;
@@ -92,9 +93,9 @@ std::vector<std::optional<Rgb>> own_scatterings_of(const ClothScene& scene,
   return scatterings;
 }
 
-MultipleScattering::LightShape::FaceLight projection_of(const MethodRow& method) {
-  using FaceLight = MultipleScattering::LightShape::FaceLight;
-  return method.as_printed ? FaceLight::kPrinted : FaceLight::kDual;
+MultipleScattering::LightShape::Projection projection_of(const MethodRow& method) {
+  using Projection = MultipleScattering::LightShape::Projection;
+  return method.as_printed ? Projection::kPrinted : Projection::kDual;
 }
 
 /// [light]; of near lights, a directional one, which nobody uses.
@@ -310,20 +311,20 @@ class BlockPicture {
                const PixelRect& crop, FrameBuffers& frame)
       : by_group_(by_group),
         camera_(&camera),
-        crop_(crop),
-        columns_((crop.width + kBlockEdge - 1) / kBlockEdge),
-        rows_((crop.height + kBlockEdge - 1) / kBlockEdge),
+        blocks_{crop},
         frame_(&frame),
         sums_(static_cast<std::size_t>(block_count()) * kBlockPixels),
         parts_(sums_.size(), by_group.size(), by_group[0]->tells_transmitted()) {}
 
-  int block_count() const { return columns_ * rows_; }
-  std::size_t first_pixel(int index) const { return place_in_picture(block_at(index), crop_, 0); }
+  int block_count() const { return blocks_.count(); }
+  std::size_t first_pixel(int index) const {
+    return place_in_picture(blocks_.at(index), blocks_.crop, 0);
+  }
 
   /// Samples first_sample .. last_sample - 1 of a block's pixels; those before are there.
   void shade_block(int index, int first_sample, int last_sample) {
     if (first_sample == last_sample) return;
-    const PixelRect block = block_at(index);
+    const PixelRect block = blocks_.at(index);
     const std::size_t first_sum = static_cast<std::size_t>(index) * kBlockPixels;
     std::vector<std::vector<EyeSample>> seen(by_group_.size());  // [group][sample]
     std::vector<EyeSample> by_group(by_group_.size());           // of one sample
@@ -340,11 +341,11 @@ class BlockPicture {
         parts_.add(pixel, by_group);
       }
       if (first == 0)
-        store_first_samples(by_group_[0]->scene(), g_buffer, *camera_, crop_, *frame_);
+        store_first_samples(by_group_[0]->scene(), g_buffer, *camera_, blocks_.crop, *frame_);
     }
     for (int pixel = 0; pixel < block.width * block.height; ++pixel) {
       const std::size_t sum = first_sum + static_cast<std::size_t>(pixel);
-      const std::size_t place = place_in_picture(block, crop_, pixel);
+      const std::size_t place = place_in_picture(block, blocks_.crop, pixel);
       sums_[sum].store(last_sample, place, *frame_);
       parts_.store(sum, last_sample, place, *frame_);
     }
@@ -353,18 +354,9 @@ class BlockPicture {
  private:
   static constexpr std::size_t kBlockPixels = kBlockEdge * kBlockEdge;
 
-  PixelRect block_at(int index) const {
-    const int left = index % columns_ * kBlockEdge;  // within the crop
-    const int top = index / columns_ * kBlockEdge;
-    return {crop_.x0 + left, crop_.y0 + top, std::min(kBlockEdge, crop_.width - left),
-            std::min(kBlockEdge, crop_.height - top)};
-  }
-
   std::span<const PrecomputedRenderer* const> by_group_;
   const Camera* camera_;
-  PixelRect crop_;
-  int columns_;
-  int rows_;
+  PictureBlocks blocks_;
   FrameBuffers* frame_;
   std::vector<PixelSums> sums_;  // [block][pixel]
   PartSums parts_;               // the same

@@ -327,15 +327,8 @@ void add_scene_layers(const ClothScene& scene, const LayerPieces& pieces, const 
                       const SceneLayerChoice& choice, FrameBuffers& frame) {
   if (!choice.surface && !choice.mattes) return;
   ScenePass pass(scene, pieces, camera, crop, seed, choice, frame);
-  const int columns = (crop.width + kBlockEdge - 1) / kBlockEdge;
-  const int rows = (crop.height + kBlockEdge - 1) / kBlockEdge;
-  tbb::parallel_for(0, columns * rows, [&](int index) {
-    const int left = index % columns * kBlockEdge;
-    const int top = index / columns * kBlockEdge;
-    pass.run({crop.x0 + left, crop.y0 + top, std::min(kBlockEdge, crop.width - left),
-              std::min(kBlockEdge, crop.height - top)},
-             eye_rays);
-  });
+  const PictureBlocks blocks{crop};
+  tbb::parallel_for(0, blocks.count(), [&](int index) { pass.run(blocks.at(index), eye_rays); });
   pass.finish();
 }
 

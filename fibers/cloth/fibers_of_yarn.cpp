@@ -21,12 +21,8 @@ using Vec2d = Eigen::Vector2d;
 
 constexpr double kTurn = 2 * kPi;
 
-// Wander is a sum of this many Fourier modes per axis. Their wavelengths lie between kShortestWave
-// and kLongestWave fiber radii. That is long against the fiber's thickness, and short enough that
-// even 10 degrees stay within the yarn.
+// Wander is a sum of this many Fourier modes per axis.
 constexpr int kWanderModes = 4;
-constexpr double kShortestWave = 25;
-constexpr double kLongestWave = 80;
 
 // A fiber's place in its ply is jittered by this share of the spacing of the sunflower pattern.
 constexpr double kPlaceJitter = 0.25;
@@ -69,8 +65,8 @@ using WanderModes = std::array<WanderMode, kWanderModes>;
 WanderModes wander_modes(double slope_rms, double period_mm, double radius_mm,
                          RandomStream& random) {
   WanderModes modes{};
-  const double most = std::max(1.0, period_mm / (kShortestWave * radius_mm));
-  const double least = std::min(most, std::max(1.0, period_mm / (kLongestWave * radius_mm)));
+  const double most = std::max(1.0, period_mm / (kShortestWander * radius_mm));
+  const double least = std::min(most, std::max(1.0, period_mm / (kLongestWander * radius_mm)));
   // Each mode carries an equal share of the squared slope: (amplitude * 2 pi waves / period)^2 / 2
   // = rms^2 / modes.
   for (WanderMode& mode : modes) {

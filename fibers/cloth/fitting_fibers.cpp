@@ -14,10 +14,6 @@ namespace {
 constexpr double kFullTurn = 2 * kPi;
 constexpr double kGoldenShare = 0.6180339887498949;
 
-// Wavelengths of the wander, in fiber radii: as of yarns that need not fit.
-constexpr double kShortestWander = 25;
-constexpr double kLongestWander = 80;
-
 // Wander becomes a block's own over half the longest wave, or this share of a block.
 constexpr double kLongestRamp = 0.3;
 

@@ -28,6 +28,11 @@
 
 namespace heddle {
 
+/// Wavelengths of the fibers' wander, in fiber radii, in yarns that must fit and in all others:
+/// long against the fiber's thickness, and short enough that even 10 degrees stay within the yarn.
+inline constexpr double kShortestWander = 25;
+inline constexpr double kLongestWander = 80;
+
 /// The blocks of a tile along one of its yarns.
 struct BlocksOfYarn {
   int count = 0;  // 0: they need not fit

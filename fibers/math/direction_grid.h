@@ -10,6 +10,7 @@
 #include <cassert>
 #include <cmath>
 #include <cstdint>
+#include <vector>
 
 #include "fibers/math/vector.h"
 
@@ -49,6 +50,13 @@ class DirectionGrid {
   struct Place {
     std::array<std::uint32_t, 4> cells;
     std::array<float, 4> shares;
+
+    /// Of a value per cell.
+    float mean(const std::vector<float>& of_cells) const {
+      float sum = 0;
+      for (std::size_t i = 0; i < 4; ++i) sum += shares[i] * of_cells[cells[i]];
+      return sum;
+    }
   };
   Place place(const Vec3& direction) const {
     const float radius = std::sqrt(std::max(0.0F, 1 - std::abs(direction.z())));

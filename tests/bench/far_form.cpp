@@ -22,22 +22,10 @@
 #include "render/far_form.h"
 #include "render/multiple_scattering.h"
 #include "render/single_scattering.h"
+#include "tests/bench/flat_pairs.h"
 
 namespace heddle {
 namespace {
-
-constexpr int kFarViews = 41;
-constexpr std::array<double, 4> kFarTheta = {10, 30, 50, 70};
-constexpr std::array<double, 3> kFarAzimuth = {0, 60, 135};
-constexpr std::size_t kFarLights = kFarTheta.size() * kFarAzimuth.size();
-
-Vec3 far_direction(double theta_degrees, double azimuth_degrees) {
-  const double theta = radians(theta_degrees);
-  const double azimuth = radians(azimuth_degrees);
-  return Vec3d(std::sin(theta) * std::cos(azimuth), std::sin(theta) * std::sin(azimuth),
-               std::cos(theta))
-      .cast<float>();
-}
 
 struct FarParts {
   Rgbd single = Rgbd::Zero();
@@ -73,14 +61,12 @@ void compare(const FabricPack& pack, const TileScene& scene, const FarForm& form
   const SingleScattering single(&*pack.ssdf, pack.sgs ? &*pack.sgs : nullptr, pack.materials);
   const MultipleScattering multiple(*pack.transfer, pack.materials, pack.bundle_tangent);
   const MultipleScattering::LightShape shape(sharpness);
-  std::array<Vec3, kFarLights> lights;
-  for (std::size_t l = 0; l < kFarLights; ++l)
-    lights[l] =
-        far_direction(kFarTheta[l / kFarAzimuth.size()], kFarAzimuth[l % kFarAzimuth.size()]);
-  std::vector<std::array<Pair, kFarLights>> pairs(kFarViews);
-  tbb::parallel_for(0, kFarViews, [&](int view) {
-    std::array<Pair, kFarLights>& own = pairs[static_cast<std::size_t>(view)];
-    const Vec3 wo = far_direction(-80.0 + 4.0 * view, 0);
+  std::array<Vec3, kLights> lights;
+  for (int l = 0; l < kLights; ++l) lights[l] = direction_of(light_theta(l), light_azimuth(l));
+  std::vector<std::array<Pair, kLights>> pairs(kViews);
+  tbb::parallel_for(0, kViews, [&](int view) {
+    std::array<Pair, kLights>& own = pairs[static_cast<std::size_t>(view)];
+    const Vec3 wo = direction_of(view_degrees(view), 0);
     const Exemplar& exemplar = pack.exemplar;
     const int strata = std::max(1, static_cast<int>(std::sqrt(rays)));
     for (int ray = 0; ray < strata * strata; ++ray) {
@@ -99,7 +85,7 @@ void compare(const FabricPack& pack, const TileScene& scene, const FarForm& form
                                exemplar.segment_material(hit->segment),
                                {tangent, tangent},
                                {wo, wo}};
-      for (std::size_t l = 0; l < kFarLights; ++l) {
+      for (int l = 0; l < kLights; ++l) {
         const DirectionPair axis{lights[l], lights[l]};
         const Rgb one = sharpness ? single.spherical_gaussian(point, axis, *sharpness)
                                   : single.directional(point, axis);
@@ -112,10 +98,8 @@ void compare(const FabricPack& pack, const TileScene& scene, const FarForm& form
     }
     const FarForm::View seen = form.view(wo);
     const FarTable& table = form.table();
-    float coverage = 0;
-    for (std::size_t i = 0; i < 4; ++i)
-      coverage += seen.place.shares[i] * table.coverage[seen.place.cells[i]];
-    for (std::size_t l = 0; l < kFarLights; ++l) {
+    const float coverage = seen.place.mean(table.coverage);
+    for (int l = 0; l < kLights; ++l) {
       std::array<float, sh_count(kMaxShOrder)> c_light;
       shape.project(table.order, table.both_sides, lights[l], c_light.data());
       own[l].far.single = (coverage * form.single(seen, lights[l], sharpness)).cast<double>();

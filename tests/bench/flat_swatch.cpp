@@ -61,33 +61,10 @@
 #include "render/rivals/prt_scattering.h"
 #include "render/rivals/tsai_shih_scattering.h"
 #include "render/single_scattering.h"
+#include "tests/bench/flat_pairs.h"
 
 namespace heddle {
 namespace {
-
-constexpr int kViews = 41;
-constexpr int kLights = 12;
-constexpr std::array<double, 4> kLightTheta = {10, 30, 50, 70};
-constexpr std::array<double, 3> kLightAzimuth = {0, 60, 135};
-
-double view_degrees(int view) {
-  return -80.0 + 4.0 * view;
-}
-
-Vec3 direction_of(double theta_degrees, double azimuth_degrees) {
-  const double theta = radians(theta_degrees);
-  const double azimuth = radians(azimuth_degrees);
-  return Vec3d(std::sin(theta) * std::cos(azimuth), std::sin(theta) * std::sin(azimuth),
-               std::cos(theta))
-      .cast<float>();
-}
-
-double light_theta(int light) {
-  return kLightTheta[static_cast<std::size_t>(light) / kLightAzimuth.size()];
-}
-double light_azimuth(int light) {
-  return kLightAzimuth[static_cast<std::size_t>(light) % kLightAzimuth.size()];
-}
 
 enum Method {
   kReference,
@@ -142,7 +119,7 @@ class Swatch {
         single_(&*pack.ssdf, pack.sgs ? &*pack.sgs : nullptr, pack.materials),
         multiple_(*pack.transfer, pack.materials, pack.bundle_tangent),
         shape_(options.sharpness),
-        printed_shape_(options.sharpness, LightShape::FaceLight::kPrinted),
+        printed_shape_(options.sharpness, LightShape::Projection::kPrinted),
         prt_(*pack.ssdf, pack.light_from_both_sides, pack.materials),
         tsai_shih_16_(*pack.ssdf, pack.light_from_both_sides, pack.materials,
                       BcsdfFactors::kRecommendedTerms),

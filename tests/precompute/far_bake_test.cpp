@@ -20,12 +20,7 @@ struct OpenFabric {
 
   OpenFabric(const Exemplar& exemplar, bool both_sides) : scene(exemplar) {
     const std::size_t segments = exemplar.segment_count();
-    ssdf.components = 1;
-    const auto texels = static_cast<std::size_t>(ssdf.resolution * ssdf.resolution);
-    ssdf.mean.assign(texels, kPif);
-    ssdf.basis.assign(texels, 0.0F);
-    ssdf.coefficients.resize(segments);
-    ssdf.sees_nothing.assign(segments, 0);
+    ssdf = open_distances(segments);
     transfer.order = 2;
     transfer.both_sides = both_sides;
     transfer.cell_of_segment.assign(segments, 0);

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "fibers/math/hemisphere_dual.h"
+#include "fibers/math/light_dual.h"
 #include "fibers/math/quadrature.h"
 #include "fibers/math/random.h"
 #include "fibers/math/sampling.h"
@@ -31,6 +31,12 @@ Transfer diagonal_transfer(int order, const std::array<float, 3>& diagonal, bool
   transfer.standard_error.assign(static_cast<std::size_t>(3 * (order + 1)), 0.0F);
   transfer.paths = {1};
   return transfer;
+}
+
+/// Light projected onto the harmonics themselves.
+MultipleScattering::LightShape printed_shape(std::optional<float> sharpness) {
+  using LightShape = MultipleScattering::LightShape;
+  return LightShape(sharpness, LightShape::Projection::kPrinted);
 }
 
 /// Integral over the sphere of f(direction) by a product rule in the inclination to and the azimuth
@@ -130,7 +136,7 @@ TEST(MultipleScatteringAgreement, RotatedDotProductEqualsQuadratureOfTheTruncate
         });
       };
       CellLight arriving;
-      multiple.incoming(0, MultipleScattering::LightShape(std::nullopt), light, arriving);
+      multiple.incoming(0, printed_shape(std::nullopt), light, arriving);
       const Rgb got = multiple.outgoing(arriving.harmonics, 0, tangent, wo);
       // Relative to the response to the positive part: ringing may bring the sum close to 0.
       const double scale = quadrature(0).maxCoeff();
@@ -140,14 +146,14 @@ TEST(MultipleScatteringAgreement, RotatedDotProductEqualsQuadratureOfTheTruncate
   }
 }
 
-TEST(MultipleScatteringAgreement, LightShapeIsTheProjectionOfTheNormalisedGaussian) {
+TEST(MultipleScatteringAgreement, PrintedShapeIsTheProjectionOfTheNormalisedGaussian) {
   const std::vector<BcsdfTable> materials;
   const Transfer transfer = diagonal_transfer(5, {1, 1, 1}, true);
   const MultipleScattering multiple(transfer, materials);
   const Vec3 axis = Vec3(0.3F, -0.5F, 0.7F).normalized();
   for (const float sharpness : {0.0F, 0.5F, 10.0F, 60.0F}) {
     CellLight arriving;
-    multiple.incoming(0, MultipleScattering::LightShape(sharpness), axis, arriving);
+    multiple.incoming(0, printed_shape(sharpness), axis, arriving);
     const IncomingField& field = arriving.harmonics;
     for (int j = 0; j < sh_count(5); ++j) {
       const Rgbd expected = integrate_sphere(Mat3d::Identity(), [&](const Vec3d& w) -> Rgbd {
@@ -218,7 +224,7 @@ TEST(MultipleScatteringAgreement, FaceLightIsTheProjectionOfItsMomentsAboveTheHo
         }
       }
       Eigen::Matrix<float, sh_count(5), 1> dual = expected.cast<float>();
-      HemisphereDual::of_order(5).apply(dual.data());
+      LightDual::of(5, false).apply(dual.data());
       const Harmonics difference =
           Eigen::Map<const Eigen::Matrix<float, sh_count(5), 1>>(got.data()).cast<double>() -
           dual.cast<double>();
@@ -229,6 +235,38 @@ TEST(MultipleScatteringAgreement, FaceLightIsTheProjectionOfItsMomentsAboveTheHo
     }
   }
   std::printf("  largest error of the projection: %.4f of its norm\n", worst);
+}
+
+// The weights of a light from both sides are the mean of those of its directions.
+TEST(MultipleScatteringAgreement, LightFromBothSidesIsTheMeanOfItsDirections) {
+  using Weights = Eigen::Matrix<float, sh_count(5), 1>;
+  for (const float sharpness : {0.0F, 2.0F, 30.0F, 150.0F}) {
+    const MultipleScattering::LightShape shape(sharpness);
+    for (const Vec3& axis : {Vec3(0.3F, -0.5F, 0.7F), Vec3(-0.9F, 0.2F, 0.05F),
+                             Vec3(0.4F, 0.6F, -0.1F), Vec3(0, 0, -1)}) {
+      const Vec3 unit = axis.normalized();
+      const Mat3d frame = frame_about(unit).cast<double>();
+      Weights expected = Weights::Zero();
+      const QuadratureRule shares = gauss_legendre(64, 0, 1);
+      constexpr int kAzimuths = 64;
+      for (std::size_t p = 0; p < shares.nodes.size(); ++p) {
+        const double along = 1 - sg_depth_of_share(shares.nodes[p], static_cast<double>(sharpness));
+        const double across = std::sqrt(std::max(0.0, 1 - along * along));
+        for (int a = 0; a < kAzimuths; ++a) {
+          const double phi = 2 * kPi * (a + 0.5) / kAzimuths;
+          const Vec3d w = frame * Vec3d(along, across * std::cos(phi), across * std::sin(phi));
+          Weights moments;
+          two_sided_moments(5, w.cast<float>(), moments.data());
+          expected += static_cast<float>(shares.weights[p] / kAzimuths) * moments;
+        }
+      }
+      LightDual::of(5, true).apply(expected.data());
+      Weights got;
+      shape.project(5, true, unit, got.data());
+      EXPECT_LT((got - expected).norm() / expected.norm(), 0.02)
+          << sharpness << ", axis " << unit.transpose();
+    }
+  }
 }
 
 // What it is for: a response that falls to 0 at the horizon is kept for light near the horizon.
@@ -305,6 +343,8 @@ TEST(MultipleScatteringAgreement, LightOnConesEqualsQuadratureOfItsModel) {
          {std::optional<float>(), std::optional<float>(200.0F)}) {
       const MultipleScattering::LightShape shape(sharpness);
       const Rgb got = multiple.radiance(shape, light, 0, 0, tangent, wo);
+      float weight = 0;  // of the constant harmonic
+      shape.project(0, true, light, &weight);
       const Mat3d axes = frame.transpose().cast<double>();
       const Mat3d own = frame_about(tangent).cast<double>();
       Rgbd expected = Rgbd::Zero();
@@ -326,7 +366,7 @@ TEST(MultipleScatteringAgreement, LightOnConesEqualsQuadratureOfItsModel) {
             double f = 0;
             for (std::size_t m = 0; m < values.size(); ++m) {
               f += values[m] * moments[static_cast<std::size_t>(d) * ConeTransfer::kAzimuths + m] *
-                   std::sqrt(1 / (4 * kPi));
+                   static_cast<double>(weight);
             }
             const Vec3d w = axes * Vec3d(std::sin(theta), std::cos(theta) * std::cos(phi),
                                          std::cos(theta) * std::sin(phi));
@@ -345,7 +385,7 @@ TEST(MultipleScatteringAgreement, LightOnConesEqualsQuadratureOfItsModel) {
 
 TEST(LightShapesAgreement, InterpolatesBetweenSharpnesses) {
   using LightShape = MultipleScattering::LightShape;
-  const LightShapes shapes(LightShape::FaceLight::kDual);
+  const LightShapes shapes(LightShape::Projection::kDual);
   double worst = 0;
   for (const float sharpness : {1.2F, 3.4F, 9.5F, 27.0F, 76.0F, 400.0F, 3000.0F}) {
     const LightShape exact(sharpness);
@@ -379,7 +419,7 @@ TEST(MultipleScatteringLaw, SoftAndPrintedLightsLeaveConesInTheHarmonics) {
   EXPECT_EQ(LightShape(8.0F).on_cones().share, 0);
   EXPECT_FLOAT_EQ(LightShape(14.0F).on_cones().share, 0.5F);
   EXPECT_EQ(LightShape(20.0F).on_cones().share, 1);
-  EXPECT_EQ(LightShape(std::nullopt, LightShape::FaceLight::kPrinted).on_cones().share, 0);
+  EXPECT_EQ(LightShape(std::nullopt, LightShape::Projection::kPrinted).on_cones().share, 0);
   float last = 0;
   for (float sharpness = 5; sharpness < 25; sharpness += 0.5F) {
     const float share = LightShape(sharpness).on_cones().share;
@@ -395,16 +435,18 @@ TEST(MultipleScattering, PrintedProjectionTakesNoNoticeOfTheHorizon) {
   const Vec3 axis = Vec3(0.5F, -0.3F, 0.4F).normalized();
   for (const std::optional<float> sharpness :
        {std::optional<float>(), std::optional<float>(30.0F)}) {
-    const LightShape printed(sharpness, LightShape::FaceLight::kPrinted);
+    const LightShape printed(sharpness, LightShape::Projection::kPrinted);
     const LightShape shipped(sharpness);
     std::array<float, sh_count(5)> face;
     std::array<float, sh_count(5)> both;
     std::array<float, sh_count(5)> dual;
     printed.project(5, false, axis, face.data());
-    shipped.project(5, true, axis, both.data());
-    shipped.project(5, false, axis, dual.data());
+    printed.project(5, true, axis, both.data());
     EXPECT_EQ(face, both);
-    EXPECT_NE(face, dual);
+    for (const bool both_sides : {false, true}) {
+      shipped.project(5, both_sides, axis, dual.data());
+      EXPECT_NE(face, dual);
+    }
   }
 }
 

@@ -16,27 +16,14 @@
 #include "tests/support/pictures.h"
 #include "tests/support/small_exemplars.h"
 #include "tests/support/statistics.h"
+#include "tests/support/traced_world.h"
 
 namespace heddle {
 namespace {
 
-struct World {
-  std::unique_ptr<ClothScene> scene;
-  std::vector<BcsdfTable> materials;
-  std::vector<Light> lights;
-
-  PathTracer tracer(LightEstimator estimator, bool local = false,
-                    int max_scatterings = 4096) const {
-    PathTracerSettings settings;
-    settings.estimator = estimator;
-    settings.local = local;
-    settings.limits.max_scatterings = max_scatterings;
-    return {*scene, materials, lights, Rgb(0, 0, 0), settings};
-  }
-};
-
-World make_world(Exemplar exemplar, std::vector<ClothMesh> meshes, std::vector<Light> lights) {
-  World world;
+TracedWorld make_world(Exemplar exemplar, std::vector<ClothMesh> meshes,
+                       std::vector<Light> lights) {
+  TracedWorld world;
   const auto tile = std::make_shared<TileScene>(std::move(exemplar));
   std::vector<ClothPiece> pieces;
   for (ClothMesh& mesh : meshes) pieces.push_back({tile, std::move(mesh)});
@@ -98,8 +85,8 @@ TEST(PathTracerLaw, Furnace) {
   const std::vector<Light> light = {
       test::sg_light({0, 0, 1}, 0, Rgb(1, 1, 1) * static_cast<float>(4 * kPi))};
   for (const bool curved : {false, true}) {
-    const World world = make_world(crossed_layers(test::white_fiber()),
-                                   {curved ? curved_patch() : flat_cloth(6, 6)}, light);
+    const TracedWorld world = make_world(crossed_layers(test::white_fiber()),
+                                         {curved ? curved_patch() : flat_cloth(6, 6)}, light);
     const Means escapes = measure(world.tracer(LightEstimator::kEscapes), 2000, 1);
     EXPECT_NEAR(escapes.total[0].mean(), 1, 1e-4);
     EXPECT_LT(escapes.total[0].standard_error(), 1e-4);
@@ -122,7 +109,7 @@ TEST(PathTracerLaw, FurnaceOfHairsAndKnits) {
   for (const FabricConfig& config : {test::small_hairy_fabric(), test::small_knit()}) {
     Exemplar exemplar = synthesize(config);
     exemplar.scattering.assign(exemplar.scattering.size(), test::white_fiber());
-    const World world = make_world(std::move(exemplar), {curved_patch()}, light);
+    const TracedWorld world = make_world(std::move(exemplar), {curved_patch()}, light);
     const Means escapes = measure(world.tracer(LightEstimator::kEscapes), 1000, 1);
     EXPECT_NEAR(escapes.total[0].mean(), 1, 1e-4);
     const Means means = measure(world.tracer(LightEstimator::kCombined), 10000, 2);
@@ -134,8 +121,8 @@ TEST(PathTracerLaw, FurnaceOfHairsAndKnits) {
 
 TEST(PathTracerStatistical, EstimatorsAgreeInHairsAndKnits) {
   for (const FabricConfig& config : {test::small_hairy_fabric(), test::small_knit()}) {
-    const World world = make_world(synthesize(config), {curved_patch()},
-                                   {test::sg_light({-0.4F, 0.3F, 1}, 30, Rgb(3, 3, 3))});
+    const TracedWorld world = make_world(synthesize(config), {curved_patch()},
+                                         {test::sg_light({-0.4F, 0.3F, 1}, 30, Rgb(3, 3, 3))});
     const Means shadow = measure(world.tracer(LightEstimator::kShadowRays), 20000, 4);
     const Means escapes = measure(world.tracer(LightEstimator::kEscapes), 60000, 5);
     EXPECT_TRUE(means_agree("shadow rays, escapes", shadow.total[0].mean(),
@@ -149,14 +136,15 @@ TEST(PathTracerStatistical, EstimatorsAgreeInHairsAndKnits) {
 TEST(PathTracerLaw, FurnaceSeesALostBounce) {
   const std::vector<Light> light = {
       test::sg_light({0, 0, 1}, 0, Rgb(1, 1, 1) * static_cast<float>(4 * kPi))};
-  const World world = make_world(crossed_layers(test::white_fiber()), {flat_cloth(6, 6)}, light);
+  const TracedWorld world =
+      make_world(crossed_layers(test::white_fiber()), {flat_cloth(6, 6)}, light);
   EXPECT_LT(measure(world.tracer(LightEstimator::kCombined, false, 10), 2000, 3).total[0].mean(),
             0.99);
 }
 
 TEST(PathTracerStatistical, EstimatorsAgreeUnderASharpGaussian) {
-  const World world = make_world(crossed_layers(test_cotton()), {curved_patch()},
-                                 {test::sg_light({-0.4F, 0.3F, 1}, 150, Rgb(3, 3, 3))});
+  const TracedWorld world = make_world(crossed_layers(test_cotton()), {curved_patch()},
+                                       {test::sg_light({-0.4F, 0.3F, 1}, 150, Rgb(3, 3, 3))});
   const Means shadow = measure(world.tracer(LightEstimator::kShadowRays), 40000, 4);
   const Means escapes = measure(world.tracer(LightEstimator::kEscapes), 200000, 5);
   const Means combined = measure(world.tracer(LightEstimator::kCombined), 40000, 6);
@@ -174,10 +162,10 @@ TEST(PathTracerStatistical, EstimatorsAgreeUnderASharpGaussian) {
 TEST(PathTracerStatistical, AVerySharpGaussianIsADirectionalLight) {
   const Vec3 axis = Vec3(-0.4F, 0.3F, 1).normalized();
   const Rgb irradiance(2, 3, 4);
-  const World sharp = make_world(crossed_layers(test_cotton()), {curved_patch()},
-                                 {test::sg_light(axis, 1e5F, irradiance)});
-  const World directional = make_world(crossed_layers(test_cotton()), {curved_patch()},
-                                       {{LightType::kDirectional, axis, 0, irradiance}});
+  const TracedWorld sharp = make_world(crossed_layers(test_cotton()), {curved_patch()},
+                                       {test::sg_light(axis, 1e5F, irradiance)});
+  const TracedWorld directional = make_world(crossed_layers(test_cotton()), {curved_patch()},
+                                             {{LightType::kDirectional, axis, 0, irradiance}});
   const Means a = measure(sharp.tracer(LightEstimator::kCombined), 40000, 7);
   const Means b = measure(directional.tracer(LightEstimator::kCombined), 40000, 8);
   for (int c = 0; c < 3; ++c) {
@@ -192,7 +180,7 @@ TEST(PathTracerStatistical, EstimatorsAgreeUnderNearLights) {
   for (const Light& light :
        {test::sphere_light({-2, 1, 4}, 1.5, Rgb(3, 3, 3)),
         test::rectangle_light({-2, 1, 4}, {0.4, -0.2, -1}, {0, 1, 0}, 4, 2, Rgb(3, 3, 3))}) {
-    const World world = make_world(crossed_layers(test_cotton()), {curved_patch()}, {light});
+    const TracedWorld world = make_world(crossed_layers(test_cotton()), {curved_patch()}, {light});
     const Means shadow = measure(world.tracer(LightEstimator::kShadowRays), 30000, 4);
     const Means escapes = measure(world.tracer(LightEstimator::kEscapes), 60000, 5);
     const Means combined = measure(world.tracer(LightEstimator::kCombined), 30000, 6);
@@ -209,7 +197,7 @@ TEST(PathTracerAgreement, FarAwayANearLightIsOneAtInfinity) {
   const Vec3d axis = Vec3d(-0.4, 0.3, 1).normalized();
   const Rgb irradiance(2, 3, 4);
   const auto tracer_mean = [&](const Light& light, std::uint64_t seed) {
-    const World world = make_world(crossed_layers(test_cotton()), {curved_patch()}, {light});
+    const TracedWorld world = make_world(crossed_layers(test_cotton()), {curved_patch()}, {light});
     return measure(world.tracer(LightEstimator::kCombined), 20000, seed);
   };
   // 1000 times as far as the cloth is wide: the same random numbers, nearly the same light.
@@ -233,10 +221,10 @@ TEST(PathTracerAgreement, FarAwayANearLightIsOneAtInfinity) {
 
 TEST(PathTracerLaw, AnEvenTextureIsNone) {
   Light light = test::rectangle_light({-2, 1, 4}, {0.4, -0.2, -1}, {0, 1, 0}, 4, 2, Rgb(3, 3, 3));
-  const World plain = make_world(crossed_layers(test_cotton()), {curved_patch()}, {light});
+  const TracedWorld plain = make_world(crossed_layers(test_cotton()), {curved_patch()}, {light});
   light.texture = std::make_shared<const RadiancePicture>(
       RadiancePicture{3, 2, std::vector<Rgb>(6, Rgb(1, 1, 1))});
-  const World textured = make_world(crossed_layers(test_cotton()), {curved_patch()}, {light});
+  const TracedWorld textured = make_world(crossed_layers(test_cotton()), {curved_patch()}, {light});
   const Means a = measure(plain.tracer(LightEstimator::kCombined), 500, 4);
   const Means b = measure(textured.tracer(LightEstimator::kCombined), 500, 4);
   EXPECT_GT(a.total[0].mean(), 0);
@@ -255,17 +243,17 @@ TEST(PathTracerLaw, ShadowRaysEndAtANearLight) {
   };
   for (int which = 0; which < 3; ++which) {
     for (const double z : {2.0, 4.0}) {
-      World open =
+      TracedWorld open =
           make_world(crossed_layers(test_cotton()), {flat_cloth(6, 6)}, {light_at(which, z)});
       std::vector<ClothPiece> pieces;
       pieces.push_back(
           {std::make_shared<TileScene>(crossed_layers(test_cotton())), flat_cloth(6, 6)});
-      World roofed =
+      TracedWorld roofed =
           make_world(crossed_layers(test_cotton()), {flat_cloth(6, 6)}, {light_at(which, z)});
       roofed.scene =
           std::make_unique<ClothScene>(std::move(pieces), std::vector<TriangleMesh>{roof});
       // The eye is below the roof.
-      const auto seen = [&](const World& world) {
+      const auto seen = [&](const TracedWorld& world) {
         const PathTracer tracer = world.tracer(LightEstimator::kCombined);
         double sum = 0;
         for (std::uint64_t k = 0; k < 200; ++k) {
@@ -297,7 +285,7 @@ TEST(PathTracerStatistical, SingleFiberAgainstQuadrature) {
   ClothMesh mesh = flat_cloth(10, 10);
   for (Vec3d& p : mesh.positions) p = turn * p;
   for (Vec3d& n : mesh.normals) n = turn * n;
-  const World world = make_world(single_fiber(fiber), {mesh}, {light});
+  const TracedWorld world = make_world(single_fiber(fiber), {mesh}, {light});
   const Vec3d tangent = turn * Vec3d(0, 1, 0);
   const Vec3d view = turn * Vec3d(0.1, 0.4, 1).normalized();
   const Vec3 direction = (-view).cast<float>();
@@ -355,9 +343,9 @@ TEST(PathTracer, LocalPathsKeepTheShadowsButNotTheLightOfOtherCloth) {
   }
   const std::vector<Light> light = {
       {LightType::kDirectional, Vec3(0.6F, 0, 0.8F), 0, Rgb(1, 1, 1)}};
-  const World with_wall =
+  const TracedWorld with_wall =
       make_world(crossed_layers(test_cotton()), {flat_cloth(3, 3), wall}, light);
-  const World alone = make_world(crossed_layers(test_cotton()), {flat_cloth(3, 3)}, light);
+  const TracedWorld alone = make_world(crossed_layers(test_cotton()), {flat_cloth(3, 3)}, light);
   const Means full = measure(with_wall.tracer(LightEstimator::kCombined), 20000, 10);
   const Means local = measure(with_wall.tracer(LightEstimator::kCombined, true), 20000, 10);
   const Means without = measure(alone.tracer(LightEstimator::kCombined, true), 20000, 10);
@@ -378,9 +366,10 @@ CameraConfig small_camera() {
 
 FrameBuffers small_picture(const PixelRect& crop, int spp, const MoreSamples& more = {},
                            int enlarged = 1) {
-  const World world = make_world(crossed_layers(test_cotton()), {curved_patch()},
-                                 {test::sg_light({-0.4F, 0.3F, 1}, 150, Rgb(3, 3, 3)),
-                                  {LightType::kDirectional, Vec3(0.6F, 0, 0.8F), 0, Rgb(1, 1, 1)}});
+  const TracedWorld world =
+      make_world(crossed_layers(test_cotton()), {curved_patch()},
+                 {test::sg_light({-0.4F, 0.3F, 1}, 150, Rgb(3, 3, 3)),
+                  {LightType::kDirectional, Vec3(0.6F, 0, 0.8F), 0, Rgb(1, 1, 1)}});
   const PathTracer tracer = world.tracer(LightEstimator::kCombined);
   CameraConfig camera = small_camera();
   camera.width *= enlarged;
@@ -517,8 +506,9 @@ TEST(PathTracerStatistical, BuffersAreConsistent) {
 }
 
 TEST(PathTracer, TimedPicturesAreWholePasses) {
-  const World world = make_world(crossed_layers(test_cotton()), {curved_patch()},
-                                 {{LightType::kDirectional, Vec3(0.6F, 0, 0.8F), 0, Rgb(1, 1, 1)}});
+  const TracedWorld world =
+      make_world(crossed_layers(test_cotton()), {curved_patch()},
+                 {{LightType::kDirectional, Vec3(0.6F, 0, 0.8F), 0, Rgb(1, 1, 1)}});
   const FrameBuffers frame =
       trace_picture(world.tracer(LightEstimator::kCombined), Camera(small_camera()), {0, 0, 24, 16},
                     1, {2, 0.05}, [](double) {});
@@ -531,10 +521,10 @@ TEST(PathTracerLaw, LightGroupsAreThePartsOfTheWhole) {
                                {LightType::kDirectional, Vec3(0.6F, 0, 0.8F), 0, Rgb(1, 1, 1)},
                                test::sg_light({0.4F, 0.3F, 1}, 5, Rgb(1, 2, 3))};
   lights[1].group = 1;
-  const World world = make_world(crossed_layers(test_cotton()), {curved_patch()}, lights);
+  const TracedWorld world = make_world(crossed_layers(test_cotton()), {curved_patch()}, lights);
   // What is lit by one group alone.
-  World of_group[2] = {make_world(crossed_layers(test_cotton()), {curved_patch()}, lights),
-                       make_world(crossed_layers(test_cotton()), {curved_patch()}, lights)};
+  TracedWorld of_group[2] = {make_world(crossed_layers(test_cotton()), {curved_patch()}, lights),
+                             make_world(crossed_layers(test_cotton()), {curved_patch()}, lights)};
   of_group[0].lights[1].irradiance = Rgb::Zero();
   of_group[1].lights[0].irradiance = of_group[1].lights[2].irradiance = Rgb::Zero();
   for (const LightEstimator estimator :
@@ -575,9 +565,10 @@ TEST(PathTracerLaw, LightGroupsAreThePartsOfTheWhole) {
 }
 
 TEST(PathTracerLaw, TransmittedIsWhatFibersWithoutTtDoNotShow) {
-  const World world = make_world(crossed_layers(test_cotton()), {curved_patch()},
-                                 {test::sg_light({-0.4F, 0.3F, 1}, 30, Rgb(3, 2, 1)),
-                                  {LightType::kDirectional, Vec3(0.6F, 0, 0.8F), 0, Rgb(1, 1, 1)}});
+  const TracedWorld world =
+      make_world(crossed_layers(test_cotton()), {curved_patch()},
+                 {test::sg_light({-0.4F, 0.3F, 1}, 30, Rgb(3, 2, 1)),
+                  {LightType::kDirectional, Vec3(0.6F, 0, 0.8F), 0, Rgb(1, 1, 1)}});
   const std::vector<BcsdfTable> reflecting = without_transmission(world.materials);
   for (const LightEstimator estimator : {LightEstimator::kShadowRays, LightEstimator::kCombined}) {
     PathTracerSettings settings;
@@ -615,7 +606,7 @@ TEST(PathTracerLaw, TransmittedIsWhatFibersWithoutTtDoNotShow) {
 }
 
 TEST(PathTracer, BackgroundIsSeenOnlyByEyeRays) {
-  World world = make_world(crossed_layers(test_cotton()), {flat_cloth(2, 2)}, {});
+  TracedWorld world = make_world(crossed_layers(test_cotton()), {flat_cloth(2, 2)}, {});
   PathTracerSettings settings;
   const PathTracer tracer(*world.scene, world.materials, world.lights, Rgb(1, 2, 3), settings);
   RandomStream random(1, RandomStage::kTest, 0, 0);

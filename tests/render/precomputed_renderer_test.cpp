@@ -28,14 +28,7 @@ FabricPack open_pack(const FiberScattering& scattering, bool both_sides = false)
   pack.materials.emplace_back(scattering);
   const std::size_t segments = pack.exemplar.segment_count();
 
-  SsdfVisibility ssdf;
-  ssdf.components = 1;
-  const auto texels = static_cast<std::size_t>(ssdf.resolution * ssdf.resolution);
-  ssdf.mean.assign(texels, kPif);
-  ssdf.basis.assign(texels, 0.0F);
-  ssdf.coefficients.resize(segments);
-  ssdf.sees_nothing.assign(segments, 0);
-  pack.ssdf = std::move(ssdf);
+  pack.ssdf = open_distances(segments);
 
   SgVisibility lobes;
   lobes.sharpness = 48;

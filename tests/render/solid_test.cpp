@@ -16,6 +16,7 @@
 #include "tests/support/pictures.h"
 #include "tests/support/small_exemplars.h"
 #include "tests/support/statistics.h"
+#include "tests/support/traced_world.h"
 
 namespace heddle {
 namespace {
@@ -51,25 +52,10 @@ ClothMesh ball(const Vec3d& centre, double radius, std::uint32_t rows = 24) {
   return mesh;
 }
 
-struct SolidWorld {
-  std::unique_ptr<ClothScene> scene;
-  std::vector<BcsdfTable> materials;
-  std::vector<Light> lights;
-
-  PathTracer tracer(LightEstimator estimator = LightEstimator::kCombined, bool local = false,
-                    int max_scatterings = 4096) const {
-    PathTracerSettings settings;
-    settings.estimator = estimator;
-    settings.local = local;
-    settings.limits.max_scatterings = max_scatterings;
-    return {*scene, materials, lights, Rgb(0, 0, 0), settings};
-  }
-};
-
 /// A ball of radius 2 mm that touches a sheet of cloth from below, nearly.
-SolidWorld ball_under_cloth(const FiberScattering& fiber, std::shared_ptr<const Paint> color,
-                            std::vector<Light> lights) {
-  SolidWorld world;
+TracedWorld ball_under_cloth(const FiberScattering& fiber, std::shared_ptr<const Paint> color,
+                             std::vector<Light> lights) {
+  TracedWorld world;
   const auto tile = std::make_shared<TileScene>(crossed_layers(fiber));
   std::vector<SurfaceCloth> solids;
   solids.emplace_back(std::move(color), ball({0, 0, -2.2}, 2), true);
@@ -116,7 +102,7 @@ TEST(SolidLaw, FurnaceOfClothAndBall) {
   const std::vector<Light> light = {
       test::sg_light({0, 0, 1}, 0, Rgb(1, 1, 1) * static_cast<float>(4 * kPi))};
   for (const std::optional<double> roughness : {std::optional<double>(), std::optional(0.4)}) {
-    const SolidWorld world =
+    const TracedWorld world =
         ball_under_cloth(test::white_fiber(), paint(Rgbd::Ones(), roughness), light);
     for (const auto& [target, from] :
          {std::pair{kOnBall, kFromSide}, std::pair{kOnCloth, kFromAbove}}) {
@@ -131,9 +117,9 @@ TEST(SolidLaw, FurnaceOfClothAndBall) {
 }
 
 TEST(SolidStatistical, EstimatorsAgree) {
-  const SolidWorld world = ball_under_cloth(test_cotton(), paint({0.8, 0.2, 0.1}, 0.3),
-                                            {test::sg_light({0.9F, 0.3F, 0.4F}, 30, Rgb(3, 3, 3)),
-                                             test::sphere_light({8, 3, -4}, 1, Rgb(10, 10, 10))});
+  const TracedWorld world = ball_under_cloth(test_cotton(), paint({0.8, 0.2, 0.1}, 0.3),
+                                             {test::sg_light({0.9F, 0.3F, 0.4F}, 30, Rgb(3, 3, 3)),
+                                              test::sphere_light({8, 3, -4}, 1, Rgb(10, 10, 10))});
   for (const auto& [target, from] :
        {std::pair{kOnBall, kFromSide}, std::pair{kOnCloth, kFromAbove}}) {
     const ColorMeans shadow =
@@ -154,7 +140,7 @@ TEST(SolidStatistical, EstimatorsAgree) {
 
 // An integrating sphere: light scattered n times is the albedo times that scattered n - 1 times.
 TEST(SolidLaw, InsideAMatteSphereLightGoesRoundAndRound) {
-  SolidWorld world;
+  TracedWorld world;
   std::vector<SurfaceCloth> solids;
   solids.emplace_back(paint({0.8, 0.5, 0.2}), ball({0, 0, 0}, 100, 48), true);
   world.scene = std::make_unique<ClothScene>(std::vector<ClothPiece>{}, std::vector<TriangleMesh>{},
@@ -183,8 +169,8 @@ TEST(SolidLaw, InsideAMatteSphereLightGoesRoundAndRound) {
 // A red ball throws red light onto white cloth, unless paths may not leave the shell.
 TEST(Solid, ColourGoesToTheClothAndLocalPathsLeaveItOut) {
   const std::vector<Light> light = {test::sg_light({0, 0, -1}, 0, Rgb(10, 10, 10))};
-  const SolidWorld red = ball_under_cloth(test_cotton(), paint({0.9, 0, 0}), light);
-  const SolidWorld black = ball_under_cloth(test_cotton(), paint({0, 0, 0}), light);
+  const TracedWorld red = ball_under_cloth(test_cotton(), paint({0.9, 0, 0}), light);
+  const TracedWorld black = ball_under_cloth(test_cotton(), paint({0, 0, 0}), light);
   const ColorMeans lit = measure_at(red.tracer(), kOnCloth, kFromAbove, 20'000, 6);
   const ColorMeans dark = measure_at(black.tracer(), kOnCloth, kFromAbove, 20'000, 6);
   EXPECT_GT(lit.total[0].mean(), dark.total[0].mean() + 6 * dark.total[0].standard_error());
@@ -198,7 +184,7 @@ TEST(Solid, ColourGoesToTheClothAndLocalPathsLeaveItOut) {
 
 // The precomputed methods light a mesh directly: what paths of one event bring.
 TEST(SolidStatistical, DirectLightIsThatOfPathsOfOneEvent) {
-  SolidWorld world;
+  TracedWorld world;
   std::vector<SurfaceCloth> solids;
   solids.emplace_back(paint({0.8, 0.5, 0.2}, 0.3), ball({0, 0, 0}, 2), true);
   const TriangleMesh roof = {{{-4, -4, 3}, {0.5F, -4, 3}, {-4, 9, 3}}, {{0, 1, 2}}};
@@ -233,8 +219,9 @@ TEST(SolidStatistical, DirectLightIsThatOfPathsOfOneEvent) {
 }
 
 TEST(SolidEndToEnd, SameBytesForAnyThreads) {
-  const SolidWorld world = ball_under_cloth(test_cotton(), paint({0.8, 0.2, 0.1}, 0.3),
-                                            {test::sg_light({0.9F, 0.3F, 0.4F}, 30, Rgb(3, 3, 3))});
+  const TracedWorld world =
+      ball_under_cloth(test_cotton(), paint({0.8, 0.2, 0.1}, 0.3),
+                       {test::sg_light({0.9F, 0.3F, 0.4F}, 30, Rgb(3, 3, 3))});
   const Camera camera = test::camera_from({9, 3, 2}, 28, 24);
   const auto picture = [&](std::size_t threads) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);

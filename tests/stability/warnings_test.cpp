@@ -299,9 +299,9 @@ TEST(PictureWarningsStability, WideLightsOnInteractiveSurfaces) {
   }
 }
 
-TEST(PictureWarningsStability, NoneOnTheQuickstart) {
+TEST(PictureWarningsStability, NoneOnTheCottonBall) {
   namespace fs = std::filesystem;
-  const fs::path file = fs::path(HEDDLE_SOURCE_DIR) / "configs" / "scenes" / "quickstart.toml";
+  const fs::path file = fs::path(HEDDLE_SOURCE_DIR) / "configs" / "scenes" / "cotton-ball.toml";
   const SceneConfig config = read_scene_config(TomlTable::load(file));
   const FabricDocument document = read_fabric_document(config.cloths.at(0).fabric, {});
   const auto tile = std::make_shared<const TileScene>(synthesize(document.config));

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 
+#include "fibers/baked/segment_visibility.h"
 #include "fibers/cloth/exemplar.h"
 #include "tests/support/fibers.h"
 
@@ -62,6 +63,18 @@ inline Exemplar crossed_layers(const FiberScattering& scattering) {
   }
   index_segments(exemplar);
   return exemplar;
+}
+
+/// Signed distances of segments that nothing hides: every direction is open.
+inline SsdfVisibility open_distances(std::size_t segments) {
+  SsdfVisibility ssdf;
+  ssdf.components = 1;
+  const auto texels = static_cast<std::size_t>(ssdf.resolution * ssdf.resolution);
+  ssdf.mean.assign(texels, kPif);
+  ssdf.basis.assign(texels, 0.0F);
+  ssdf.coefficients.resize(segments);
+  ssdf.sees_nothing.assign(segments, 0);
+  return ssdf;
 }
 
 }  // namespace heddle

@@ -1,4 +1,4 @@
-#include "fibers/math/hemisphere_dual.h"
+#include "fibers/math/light_dual.h"
 
 #include <gtest/gtest.h>
 
@@ -40,7 +40,7 @@ Moments moments_of(const std::function<double(const Vec3d&)>& function) {
 double rebuilt(const Moments& moments, const Vec3d& w) {
   std::array<float, sh_count(kOrder)> dual;
   evaluate_sh(kOrder, w.cast<float>(), dual.data());
-  HemisphereDual::of_order(kOrder).apply(dual.data());
+  LightDual::of(kOrder, false).apply(dual.data());
   double sum = 0;
   for (std::size_t j = 0; j < moments.size(); ++j) sum += moments[j] * static_cast<double>(dual[j]);
   return sum;
@@ -60,7 +60,7 @@ double relative_error(const std::function<double(const Vec3d&)>& function,
 
 // A projection: what it rebuilds, it rebuilds again from its own moments. (Floats, eigenvalues from
 // 0.09 on.)
-TEST(HemisphereDualLaw, RebuildingTwiceChangesNothing) {
+TEST(LightDualLaw, RebuildingTwiceChangesNothing) {
   const Moments first =
       moments_of([](const Vec3d& w) { return std::exp(3 * (w.x() - 1)) + w.y(); });
   const auto once = [&](const Vec3d& w) { return rebuilt(first, w); };
@@ -69,7 +69,7 @@ TEST(HemisphereDualLaw, RebuildingTwiceChangesNothing) {
 }
 
 // Least squares: the error is orthogonal to everything rebuilt.
-TEST(HemisphereDualLaw, TheErrorIsOrthogonalToTheApproximation) {
+TEST(LightDualLaw, TheErrorIsOrthogonalToTheApproximation) {
   const auto function = [](const Vec3d& w) { return std::abs(w.x()) * w.z(); };
   const Moments moments = moments_of(function);
   double product = 0;
@@ -86,7 +86,7 @@ TEST(HemisphereDualLaw, TheErrorIsOrthogonalToTheApproximation) {
 // reach the crests, and has a lobe to one side. The plain expansion, and twice its part odd in z
 // (which continues the function oddly), are the alternatives. (A function that falls to 0 like the
 // cosine itself is odd, and the odd part alone better.)
-TEST(HemisphereDualLaw, BeatsThePlainAndTheOddExpansion) {
+TEST(LightDualLaw, BeatsThePlainAndTheOddExpansion) {
   for (const double lobe : {0.0, 2.0, 8.0}) {
     const auto function = [&](const Vec3d& w) {
       return (1 - std::exp(-w.z() / 0.15)) * (0.2 + std::exp(lobe * (w.x() - 1)));
@@ -115,10 +115,87 @@ TEST(HemisphereDualLaw, BeatsThePlainAndTheOddExpansion) {
   }
 }
 
-TEST(HemisphereDual, OrderZeroIsTheMean) {
+TEST(LightDual, OrderZeroIsTheMean) {
   float value = 1;
-  HemisphereDual::of_order(0).apply(&value);
+  LightDual::of(0, false).apply(&value);
   EXPECT_NEAR(value, 2, 1e-6);  // a constant's square lies half above the horizon
+}
+
+/// Root mean square over the whole sphere of (approximation - function), over that of the function.
+double error_of_both(const std::function<double(const Vec3d&)>& function,
+                     const std::function<double(const Vec3d&)>& approximation) {
+  double error = 0;
+  double square = 0;
+  over_hemisphere([&](const Vec3d& w, double weight) {
+    for (const Vec3d& side : {w, Vec3d(w.x(), w.y(), -w.z())}) {
+      error += weight * std::pow(approximation(side) - function(side), 2);
+      square += weight * std::pow(function(side), 2);
+    }
+  });
+  return std::sqrt(error / square);
+}
+
+std::array<float, sh_count(kOrder)> weights_of_both(const Vec3d& w) {
+  std::array<float, sh_count(kOrder)> dual;
+  two_sided_moments(kOrder, w.cast<float>(), dual.data());
+  LightDual::of(kOrder, true).apply(dual.data());
+  return dual;
+}
+
+// Cloth that lets a share of the light through: from either side the response rises from 0 at the
+// plane, more or less steeply, and has a lobe to one side.
+TEST(TwoSidedDualLaw, BeatsThePlainExpansionAndDoesNotLeak) {
+  for (const double through : {0.0, 0.3, 1.0}) {
+    for (const double rise : {0.1, 0.4}) {
+      const auto function = [&](const Vec3d& w) {
+        const double z = std::abs(w.z());
+        return (w.z() > 0 ? 1 : through) * z / (z + rise) * (0.2 + std::exp(2 * (w.x() - 1)));
+      };
+      Moments moments{};
+      over_hemisphere([&](const Vec3d& w, double weight) {
+        for (const Vec3d& side : {w, Vec3d(w.x(), w.y(), -w.z())}) {
+          Moments y;
+          evaluate_sh(kOrder, side, y.data());
+          for (std::size_t j = 0; j < y.size(); ++j) moments[j] += weight * function(side) * y[j];
+        }
+      });
+      const auto rebuilt_both = [&](const Vec3d& w) {
+        const auto dual = weights_of_both(w);
+        double sum = 0;
+        for (std::size_t j = 0; j < moments.size(); ++j)
+          sum += moments[j] * static_cast<double>(dual[j]);
+        return sum;
+      };
+      const auto expansion = [&](const Vec3d& w) {
+        Moments y;
+        evaluate_sh(kOrder, w, y.data());
+        double sum = 0;
+        for (std::size_t j = 0; j < moments.size(); ++j) sum += moments[j] * y[j];
+        return sum;
+      };
+      const double own = error_of_both(function, rebuilt_both);
+      const double plain = error_of_both(function, expansion);
+      const Vec3d along(1, 0, 0);
+      std::printf("through %.1f, rise %.1f: %.4f, plain %.4f; along the plane %.4f, plain %.4f\n",
+                  through, rise, own, plain, rebuilt_both(along), expansion(along));
+      EXPECT_LT(own, 0.75 * plain);
+      EXPECT_NEAR(rebuilt_both(along), 0, 1e-6);
+      EXPECT_GT(expansion(along), 0.1) << "the plain expansion does leak";
+    }
+  }
+}
+
+// A cloth turned over is the same cloth: harmonics of odd l + m change their sign.
+TEST(TwoSidedDualLaw, BothSidesAreTreatedAlike) {
+  const Vec3d w = Vec3d(0.3, -0.5, 0.2).normalized();
+  const auto above = weights_of_both(w);
+  const auto below = weights_of_both(Vec3d(w.x(), w.y(), -w.z()));
+  for (int l = 0; l <= kOrder; ++l) {
+    for (int m = -l; m <= l; ++m) {
+      const auto j = static_cast<std::size_t>(l * (l + 1) + m);
+      EXPECT_NEAR(below[j], (l + m) % 2 == 0 ? above[j] : -above[j], 1e-5) << l << ", " << m;
+    }
+  }
 }
 
 }  // namespace
