@@ -75,20 +75,20 @@ TEST(RelightEndToEnd, MakesTheFilesThatRenderMakes) {
     EXPECT_NE(said.find(line), std::string::npos) << said;
   };
   const std::vector<std::string> crop = {"--crop", "2,1,23,20", "--spp", "9"};
-  shop.succeed({"render", "first.toml", "-o", "one.exr", "--keep", "light", "-j", "1", "--crop",
+  shop.succeed({"render", "first.toml", "-o", "kept-1.exr", "--keep", "light", "-j", "1", "--crop",
                 "2,1,23,20", "--spp", "9"});
-  shop.succeed({"render", "first.toml", "-o", "two.exr", "--keep", "light", "-j", "2", "--crop",
+  shop.succeed({"render", "first.toml", "-o", "kept-2.exr", "--keep", "light", "-j", "2", "--crop",
                 "2,1,23,20", "--spp", "9"});
-  EXPECT_EQ(text_of(shop / "one.gbuffer"), text_of(shop / "two.gbuffer"));
+  EXPECT_EQ(text_of(shop / "kept-1.gbuffer"), text_of(shop / "kept-2.gbuffer"));
 
-  const std::string same = shop.relight("one.gbuffer", "first.toml", crop);
-  EXPECT_EQ(text_of(shop / "relit.exr"), text_of(shop / "one.exr"));
+  const std::string same = shop.relight("kept-1.gbuffer", "first.toml", crop);
+  EXPECT_EQ(text_of(shop / "relit.exr"), text_of(shop / "kept-1.exr"));
   says(same, "light of key: as it was kept");
   says(same, "light of rest: as it was kept");
-  const std::string dimmed = shop.relight("one.gbuffer", "dimmed.toml", crop);
+  const std::string dimmed = shop.relight("kept-1.gbuffer", "dimmed.toml", crop);
   says(dimmed, "light of key: as it was kept");
   says(dimmed, "light of rest: shaded anew, with the shadows that were kept");
-  const std::string other = shop.relight("one.gbuffer", "other.toml", crop);
+  const std::string other = shop.relight("kept-1.gbuffer", "other.toml", crop);
   says(other, "light of key: shaded anew, with new shadow rays");
   says(other, "light of sky: shaded anew, with new shadow rays");
 
