@@ -9,6 +9,7 @@
 
 #include "fibers/baked/fabric_pack.h"
 #include "formats/atomic_file.h"
+#include "formats/chunk_file.h"
 #include "formats/curve_file.h"
 #include "formats/file_ending.h"
 #include "formats/hdr_file.h"
@@ -22,7 +23,9 @@
 #include "pipeline/draft_report.h"
 #include "pipeline/fabric_report.h"
 #include "pipeline/json_file.h"
+#include "pipeline/kept_picture.h"
 #include "pipeline/stages.h"
+#include "render/kept_samples.h"
 #include "render/render_output.h"
 #include "render/scene_config.h"
 
@@ -309,6 +312,25 @@ Report describe_obj(const fs::path& path) {
   return report;
 }
 
+Report describe_kept(const fs::path& path) {
+  const ChunkFile file(path, kKeptMark, kKeptKind);
+  const KeptPicture kept = read_kept(file);
+  return {{"kind", "G-buffer"},
+          {"scene", kept.scene},
+          {"view", kept.view},
+          {"method", render_method_name(kept.method)},
+          {"crop",
+           {kept.crop.x0, kept.crop.y0, kept.crop.x0 + kept.crop.width,
+            kept.crop.y0 + kept.crop.height}},
+          {"spp", kept.spp},
+          {"seed", kept.seed},
+          {"holds", kept.has_light ? "rays and light" : "rays"},
+          {"light_groups", kept.groups.size()},
+          {"bytes_per_sample",
+           rounded(static_cast<double>(file.bytes()) /
+                   (static_cast<double>(kept.crop.width) * kept.crop.height * kept.spp))}};
+}
+
 Report describe(const fs::path& path, const CommonOptions& common) {
   if (!fs::exists(path)) throw FileError(path.string() + ": no such file or folder");
   if (fs::is_directory(path) || path.filename() == kManifestName) {
@@ -330,10 +352,11 @@ Report describe(const fs::path& path, const CommonOptions& common) {
   if (ending == ".bcc" || ending == ".hair") return describe_curves(path);
   if (ending == ".wif") return describe_draft(path);
   if (ending == ".json") return describe_json(path);
+  if (ending == ".gbuffer") return describe_kept(path);
   throw FileError(
       path.string() +
       ": expected a pack, or a file that ends in .toml, .wif, .bcc, .hair, .safetensors, .vdb, "
-      ".exr, .hdr, .pic, .png, .obj or .json");
+      ".exr, .hdr, .pic, .png, .obj, .gbuffer or .json");
 }
 
 bool is_accuracy_table(const fs::path& path) {

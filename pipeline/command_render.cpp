@@ -48,6 +48,16 @@ void apply_overrides(const RenderOptions& options, PictureRequest& request) {
       {"mis", LightEstimator::kCombined},
       {"light", LightEstimator::kShadowRays},
       {"bcsdf", LightEstimator::kEscapes}};
+  if (!options.keep.empty()) {
+    if (path) {
+      throw ConfigError(fmt::format(
+          "--keep: the method {} finds its light by the way, and has no samples to relight",
+          render_method_name(request.method)));
+    }
+    if (options.noise) throw ConfigError("--keep: not together with --noise; choose --spp");
+    request.keep = {std::filesystem::path(options.output).replace_extension(".gbuffer"),
+                    options.keep == "light", options.view, options.order};
+  }
   request.seconds = options.seconds;
   request.local = options.local;
   request.bounces = options.bounces;
@@ -138,12 +148,6 @@ void require_frames(const SceneConfig& config, const FrameRange& frames) {
   for (int frame = frames.first; frame <= frames.last; ++frame) show_frame(scene, frame);
 }
 
-void require_picture_writable(const std::filesystem::path& exr) {
-  make_folder(exr.parent_path());
-  for (const char* extension : {".exr", ".png", ".json"})
-    require_writable(std::filesystem::path(exr).replace_extension(extension));
-}
-
 /// One picture per frame, and a contact sheet of all.
 int render_frames(const RenderOptions& options, Job& job) {
   const FrameRange frames = parse_frames(options.frames);
@@ -203,9 +207,13 @@ int render_command(const RenderOptions& options, const CommonOptions& common) {
   if (lower_case_ending(options.output) != ".exr")
     throw ConfigError("-o: expected a file name that ends in .exr");
   Job job(common);
+  if (!options.keep.empty() && (!options.frames.empty() || options.tolerance))
+    throw ConfigError("--keep: not together with --frames or --tolerance");
   if (!options.frames.empty()) return render_frames(options, job);
   if (options.resume) throw ConfigError("--resume belongs to --frames");
   require_picture_writable(options.output);  // found out now, not after hours of work
+  if (!options.keep.empty())
+    require_writable(std::filesystem::path(options.output).replace_extension(".gbuffer"));
   if (options.tolerance) return render_within(*options.tolerance, options, job);
   SceneJob scene(options.scene, job.context(), variant_of_order(options.scene, options.order));
   PictureRequest request = scene.request_with_layers(find_view(scene.config(), options.view));
@@ -214,6 +222,7 @@ int render_command(const RenderOptions& options, const CommonOptions& common) {
   if (options.noise) say_noise(*options.noise, picture, job.console());
   write_picture(options.output, picture, picture_report(picture), scene.config().look);
   job.add_artifact(options.output);
+  if (request.keep) job.add_artifact(request.keep->file);
   job.finish();
   return 0;
 }

@@ -87,10 +87,20 @@ struct RenderOptions {
   int pictures = 1;                 // that the plan reckons with
   std::string frames;               // "first-last"; empty: one picture
   bool resume = false;              // with frames: those that are finished stay
+  std::string keep;                 // of the samples, for relight: "rays" or "light"
 };
 /// With frames: NAME_0000.exr and so on, and NAME_sheet.png (docs/sequences.md). Status 1 if no way
 /// meets the tolerance; then nothing is rendered.
 int render_command(const RenderOptions& options, const CommonOptions& common);
+
+struct RelightOptions {
+  std::filesystem::path kept;    // .gbuffer
+  std::filesystem::path scene;   // .toml
+  std::filesystem::path output;  // .exr
+};
+/// The picture that `render` would make of a scene which differs in its lights only from the one
+/// that the samples were kept from (docs/relight.md). ConfigError naming what else differs.
+int relight_command(const RelightOptions& options, const CommonOptions& common);
 
 struct PlanOptions {
   std::filesystem::path scene;

@@ -11,7 +11,7 @@ namespace {
 
 constexpr int kGap = 4;  // pixels between frames, and about them
 constexpr int kDot = 2;  // pixels along a dot of a digit
-constexpr std::uint8_t kPaper = 24;
+constexpr std::uint8_t kSheetPaper = 24;
 constexpr std::uint8_t kInk = 235;
 
 // Digits of 3 x 5 dots, rows from the top, three bits a row.
@@ -99,7 +99,7 @@ RgbPicture contact_sheet(const std::vector<SheetFrame>& frames) {
       width = small.width + kGap;
       height = small.height + kGap + kLabelHeight;
       sheet = {columns * width + kGap, rows * height + kGap, {}};
-      sheet.rgb.assign(static_cast<std::size_t>(3 * sheet.width * sheet.height), kPaper);
+      sheet.rgb.assign(static_cast<std::size_t>(3 * sheet.width * sheet.height), kSheetPaper);
     }
     const int left = kGap + k % columns * width;
     const int top = kGap + k / columns * height;

@@ -61,6 +61,7 @@ struct Options {
   std::string shard;
   std::filesystem::path path;
   RenderOptions render;
+  RelightOptions relight;
   CompareOptions compare;
   ChartOptions chart;
   RunOptions run;
@@ -162,6 +163,7 @@ const char* kept_after_signal(const std::string& command) {
       {"pack", kStages},
       {"plan", kMeasurement},
       {"precompute", kStages},
+      {"relight", "the picture is lost; what it comes from is kept"},
       {"render",
        "the picture is lost; finished stages and chunks of its fabrics are kept in the cache"},
       {"run",
@@ -301,12 +303,33 @@ void add_render(CLI::App& app, Options& options, Actions& actions) {
       ->check(CLI::Range(1, 4096));
   render->add_option("--estimator", picture.estimator, "Path tracer: how lights are sampled")
       ->check(CLI::IsMember({"mis", "light", "bcsdf"}));
+  render
+      ->add_option("--keep", picture.keep,
+                   "Also writes a .gbuffer beside the picture, which `relight` takes: rays, what "
+                   "the eye rays see; or light, that and the light of each group")
+      ->check(CLI::IsMember({"rays", "light"}));
   add_order(*render, picture.order);
   add_tolerance(
       *render, picture.pictures,
       "Largest relative RMSE per pixel, noise included; a plan chooses method, samples and data",
       picture.tolerance);
   actions["render"] = [&options] { return render_command(options.render, options.common); };
+}
+
+void add_relight(CLI::App& app, Options& options, Actions& actions) {
+  CLI::App* relight = app.add_subcommand(
+      "relight", "A picture that was rendered with --keep, under other lights: no eye rays");
+  add_building(*relight, options);
+  relight->add_option("KEPT.gbuffer", options.relight.kept, "Written by render --keep")->required();
+  relight
+      ->add_option("SCENE.toml", options.relight.scene,
+                   "Scene config that differs in its lights only")
+      ->required();
+  relight
+      ->add_option("-o,--output,--outfile", options.relight.output,
+                   "The .exr file; a .png and a .json go beside it")
+      ->required();
+  actions["relight"] = [&options] { return relight_command(options.relight, options.common); };
 }
 
 void add_eval(CLI::App& app, Actions& actions) {
@@ -392,7 +415,7 @@ void add_info(CLI::App& app, Options& options, Actions& actions) {
   info->add_option(
           "PATH", options.path,
           "Fabric or scene .toml, pack, draft .wif, curves .bcc, .hair and .obj, .safetensors, "
-          ".vdb, .exr, .hdr, .png, .obj, or one of our .json files")
+          ".vdb, .exr, .hdr, .png, .obj, .gbuffer, or one of our .json files")
       ->required();
   actions["info"] = [&options] { return info_command(options.path, options.common); };
 }
@@ -429,6 +452,7 @@ Actions add_commands(CLI::App& app, Options& options) {
   add_swatch(app, options, actions);
   add_catalogue(app, options, actions);
   add_render(app, options, actions);
+  add_relight(app, options, actions);
   add_eval(app, actions);
   add_compare(app, options, actions);
   add_plan(app, options, actions);

@@ -10,6 +10,7 @@
 #include "formats/atomic_file.h"
 #include "formats/content_hash.h"
 #include "formats/input_error.h"
+#include "formats/memory_need.h"
 #include "pipeline/border_sample.h"
 #include "pipeline/cloth_layout.h"
 #include "pipeline/interrupt.h"
@@ -218,8 +219,9 @@ VisibilityBlend SceneJob::blend_for(RenderMethod method) const {
   return method_row(method).as_printed ? kPrintedBlend : variant_.blend;
 }
 
-Needs SceneJob::needs_for(RenderMethod method, const fs::path& fabric) const {
-  Needs needs = needs_of(method, config_.lights, blend_for(method));
+Needs SceneJob::needs_for(RenderMethod method, const fs::path& fabric,
+                          std::span<const Light> lights) const {
+  Needs needs = needs_of(method, lights, blend_for(method));
   needs.order = variant_.of(fabric).order;
   return needs_with_far_forms(needs, method, config_.far_from.has_value(), config_.bounces);
 }
@@ -303,6 +305,69 @@ std::string SceneJob::picture_key(const PictureRequest& request) {
   return stage_key(inputs);
 }
 
+std::vector<std::pair<std::string, std::string>> SceneJob::parts_but_lights(
+    const PictureRequest& request) {
+  std::vector<std::pair<std::string, std::string>> parts;
+  const auto add = [&parts](const std::string& name, const std::string& text) {
+    parts.emplace_back(name, content_hash(text));
+  };
+  add("program", fmt::format("{}", kPictureVersion));
+  add("camera", camera_text(request.camera));
+  const auto optional_text = [](const auto& value) {
+    return value ? fmt::format("{}", *value) : std::string();
+  };
+  add("[render]",
+      fmt::format("filter {} sigma {} bounces {} far {} blend {} {}", request.filter.text(),
+                  optional_text(config_.shadow_sigma_mm), config_.bounces,
+                  optional_text(config_.far_from), variant_.blend.from, variant_.blend.to));
+  if (is_cut_for_pictures(config_)) {
+    std::string cameras;
+    for (const CameraConfig& camera : cameras_of_cuts(config_)) cameras += camera_text(camera);
+    add("cameras of all views", cameras);
+  }
+  const auto scene = nlohmann::json::parse(scene_text_);
+  for (const auto& [key, value] : scene.items()) {
+    if (key != "cloth" && key != "mesh" && key != "light" && key != "background")
+      add(key, value.dump());
+  }
+  for (std::size_t k = 0; k < config_.cloths.size(); ++k) {
+    const ClothConfig& cloth = config_.cloths[k];
+    std::string text = scene.at("cloth").at(k).dump();
+    if (cloth.mesh) text += content_hash_of_file(cloth.mesh->path);
+    if (cloth.surface) text += cloth.surface->text;
+    if (cloth.pattern) text += content_hash_of_file(cloth.pattern->picture);
+    add(fmt::format("cloth {}", k + 1), text);
+  }
+  for (std::size_t k = 0; k < config_.meshes.size(); ++k) {
+    add(fmt::format("mesh {}", k + 1),
+        scene.at("mesh").at(k).dump() + content_hash_of_file(config_.meshes[k].path));
+  }
+  int fabric = 0;
+  for (const auto& [file, stages] : fabrics_for(request.method)) {
+    add(fmt::format("fabric {} ({})", ++fabric, file.filename().string()),
+        stages->pack_key(needs_for(request.method, file, {})));
+  }
+  return parts;
+}
+
+std::vector<std::string> SceneJob::light_keys(const PictureRequest& request) {
+  std::string files;
+  for (const fs::path& file : config_.light_files) files += content_hash_of_file(file) + "\n";
+  std::string shared = fmt::format("lobes {}\n", request.layers.lobes);
+  for (const Artifact& pack : packs_for(request.method)) shared += pack.key + "\n";
+  for (const std::string& surface : surface_stages().keys()) shared += surface + "\n";
+  const auto scene = nlohmann::json::parse(scene_text_);
+  std::vector<std::string> texts(groups_of(request), shared);
+  for (std::size_t k = 0; k < config_.lights.size(); ++k) {
+    const Light& light = config_.lights[k];
+    std::string& text = texts[texts.size() == 1 ? 0 : light.group];
+    text += scene.at("light").at(k).dump() + "\n";
+    if (light.map || light.texture) text += files;
+  }
+  for (std::string& text : texts) text = content_hash(text);
+  return texts;
+}
+
 const SurfaceStages& SceneJob::surface_stages() {
   if (!surface_stages_) {
     surface_stages_.emplace(config_, *context_, [this](const fs::path& fabric) {
@@ -381,9 +446,16 @@ struct SceneJob::Shading {
   std::map<const void*, std::vector<BcsdfTable>> reflecting;  // by whose materials they are
   std::optional<PathTracer> tracer;
   std::vector<std::unique_ptr<const PrecomputedRenderer>> renderers;  // [group]
+  std::vector<std::string> light_keys;  // [group] where samples are kept, or were
+
+  bool light_is_kept(std::size_t group, const PictureRequest& request) const {
+    const KeptPicture* kept = request.kept_picture;
+    return kept != nullptr && kept->has_light && group < kept->groups.size() &&
+           kept->groups[group].light == light_keys[group];
+  }
 
   FrameBuffers frame(const PictureRequest& request, const Camera& camera, const PixelRect& crop,
-                     const RenderProgress& progress) const {
+                     const RenderProgress& progress, const SampleStore& store = {}) const {
     const MoreSamples more = request.noise ? until_noise(*request.noise) : request.more;
     if (tracer) {
       return trace_picture(*tracer, camera, crop, request.seed,
@@ -391,7 +463,7 @@ struct SceneJob::Shading {
     }
     std::vector<const PrecomputedRenderer*> by_group;
     for (const auto& renderer : renderers) by_group.push_back(renderer.get());
-    return shade_picture(by_group, camera, crop, request.spp, progress, more);
+    return shade_picture(by_group, camera, crop, request.spp, progress, more, store);
   }
 
   /// Of the environments that are fitted worst.
@@ -439,7 +511,9 @@ std::unique_ptr<SceneJob::Shading> SceneJob::shading_for(const PictureRequest& r
   shading->lights.resize(groups_of(request));
   for (const Light& light : config_.lights)
     shading->lights[shading->lights.size() == 1 ? 0 : light.group].push_back(light);
+  if (request.keep || request.kept_picture != nullptr) shading->light_keys = light_keys(request);
   for (std::size_t group = 0; group < shading->lights.size(); ++group) {
+    if (shading->light_is_kept(group, request)) shading->lights[group].clear();
     // Noise of different groups is independent; only the first one looks through the pixels.
     settings.seed = request.seed + (std::uint64_t{group} << 40U);
     if (group > 0 && method_row(settings.method).marches_volume)
@@ -449,6 +523,55 @@ std::unique_ptr<SceneJob::Shading> SceneJob::shading_for(const PictureRequest& r
         group == 0 ? config_.background : Rgb(Rgb::Zero()), settings));
   }
   return shading;
+}
+
+KeptPicture SceneJob::kept_picture_of(const PictureRequest& request, const Shading& shading) {
+  KeptPicture kept{.scene = config_.name,
+                   .view = request.keep->view,
+                   .method = request.method,
+                   .spp = request.spp,
+                   .seed = request.seed,
+                   .crop = request.crop,
+                   .order = request.keep->order,
+                   .has_light = request.keep->with_light,
+                   .parts = parts_but_lights(request),
+                   .groups = {}};
+  for (std::size_t group = 0; group < shading.renderers.size(); ++group) {
+    const std::optional<std::string> text = shading.renderers[group]->visibility_text();
+    kept.groups.push_back({text ? content_hash(*text) : "", shading.light_keys[group]});
+  }
+  return kept;
+}
+
+SampleStore SceneJob::store_for(const PictureRequest& request, const Shading& shading) {
+  using enum SampleStore::Use;
+  SampleStore store{.from = request.kept_samples};
+  if (request.kept_samples == nullptr) return store;
+  const KeptPicture& kept = *request.kept_picture;
+  store.kept_groups = kept.groups.size();
+  store.use.assign(shading.renderers.size(), kSights);
+  for (std::size_t group = 0; group < store.use.size(); ++group) {
+    if (shading.light_is_kept(group, request)) {
+      store.use[group] = kLight;
+    } else if (const auto text = shading.renderers[group]->visibility_text();
+               text && group < kept.groups.size() &&
+               content_hash(*text) == kept.groups[group].visibility) {
+      store.use[group] = kVisibility;
+    }
+  }
+  return store;
+}
+
+void SceneJob::say_relit(const SampleStore& store) const {
+  for (std::size_t group = 0; group < store.use.size(); ++group) {
+    const char* how = "shaded anew, with new shadow rays";
+    if (store.use[group] == SampleStore::Use::kVisibility)
+      how = "shaded anew, with the shadows that were kept";
+    if (store.use[group] == SampleStore::Use::kLight) how = "as it was kept";
+    const std::string name =
+        store.use.size() == 1 ? "all light" : "light of " + config_.light_groups[group];
+    context_->console->say(fmt::format("{}: {}", name, how));
+  }
 }
 
 SceneJob::Crops SceneJob::render_crops(const PictureRequest& request,
@@ -481,13 +604,33 @@ void SceneJob::add_layers(const PictureRequest& request, const Shading& shading,
                              request.filter);
   const auto eye_rays = [&](const PixelRect& block, int first, int last) {
     stop_if_interrupted();
-    return shading.renderers.empty()
-               ? own_rays.run(camera, block, first, last)
-               : shading.renderers.front()->g_buffer(camera, block, first, last);
+    if (shading.renderers.empty()) return own_rays.run(camera, block, first, last);
+    const PrecomputedRenderer& looking = *shading.renderers.front();
+    if (request.kept_samples == nullptr) return looking.g_buffer(camera, block, first, last);
+    KeptChunk chunk(*loaded.scene, *request.kept_samples, block, request.crop, first, request.spp);
+    return looking.g_buffer(camera, block, first, last, chunk);
   };
   add_scene_layers(
       *loaded.scene, layer_pieces_of(config_), eye_rays, camera, request.crop, request.seed,
       {.surface = request.layers.surface, .mattes = request.layers.cryptomatte}, frame);
+}
+
+std::uint64_t SceneJob::announce_keeping(const PictureRequest& request) const {
+  std::size_t lights = 0;
+  for (const Light& light : config_.lights) {
+    const bool is_split =
+        light.type == LightType::kEnvironment || light.type == LightType::kRectangle;
+    lights += is_split ? static_cast<std::size_t>(light.gaussians + light.bright_sources) : 1U;
+  }
+  const std::size_t with_light = request.keep->with_light ? groups_of(request) : 0;
+  const auto pixels = static_cast<std::uint64_t>(request.crop.width) *
+                      static_cast<std::uint64_t>(request.crop.height);
+  const auto samples = static_cast<std::uint64_t>(request.spp);
+  context_->console->say(
+      fmt::format("{}: {} where every sample sees a fiber", request.keep->file.string(),
+                  memory_text(kept_bytes(pixels * samples, lights, with_light))));
+  constexpr std::uint64_t kWaiting = std::uint64_t{kBlocksPerReport} * kBlockEdge * kBlockEdge;
+  return kept_bytes(std::min(pixels, kWaiting) * samples, lights, with_light);
 }
 
 PictureResult SceneJob::render(const PictureRequest& request, const std::string& title,
@@ -497,13 +640,14 @@ PictureResult SceneJob::render(const PictureRequest& request, const std::string&
                                   render_method_name(request.method)));
   }
   // More samples than one are possible where a picture goes on until it is good enough.
-  const std::uint64_t bytes = picture_bytes(request.crop.width, request.crop.height,
-                                            request.more || request.noise ? 2 : request.spp,
-                                            {.of_fibers = !traces_paths(request.method),
-                                             .light_groups = groups_of(request),
-                                             .transmitted = request.layers.lobes,
-                                             .of_scene = request.layers.surface,
-                                             .mattes = request.layers.cryptomatte});
+  std::uint64_t bytes = picture_bytes(request.crop.width, request.crop.height,
+                                      request.more || request.noise ? 2 : request.spp,
+                                      {.of_fibers = !traces_paths(request.method),
+                                       .light_groups = groups_of(request),
+                                       .transmitted = request.layers.lobes,
+                                       .of_scene = request.layers.surface,
+                                       .mattes = request.layers.cryptomatte});
+  if (request.keep) bytes += announce_keeping(request);
   announce_memory(*context_->console,
                   fmt::format("{}: {} x {} pixels", title, request.crop.width, request.crop.height),
                   bytes);
@@ -545,7 +689,16 @@ PictureResult SceneJob::render(const PictureRequest& request, const std::string&
   const std::unique_ptr<Shading> shading = shading_for(request);
   if (!shading->renderers.empty() && !quiet)
     say_environment(*context_->console, shading->fitted_lights());
-  FrameBuffers frame = shading->frame(request, camera, request.crop, report_progress);
+  SampleStore store = store_for(request, *shading);
+  if (!quiet) say_relit(store);
+  std::optional<ChunkFileWriter> writer;
+  if (request.keep) {
+    writer.emplace(request.keep->file, kKeptMark, kept_text(kept_picture_of(request, *shading)));
+    store.to = &*writer;
+    store.keeps_light = request.keep->with_light;
+  }
+  FrameBuffers frame = shading->frame(request, camera, request.crop, report_progress, store);
+  if (writer) writer->commit();
   for (std::size_t g = 0; g < frame.light_groups.size(); ++g)
     frame.light_groups[g].name = config_.light_groups[g];
   add_layers(request, *shading, camera, frame);
@@ -615,6 +768,12 @@ Json picture_report(const PictureResult& picture) {
   report["thinned_shell_vertices"] = picture.thinned_vertices;
   report["warnings"] = warnings_report(picture.warnings);
   return report;
+}
+
+void require_picture_writable(const fs::path& exr) {
+  make_folder(exr.parent_path());
+  for (const char* extension : {".exr", ".png", ".json"})
+    require_writable(fs::path(exr).replace_extension(extension));
 }
 
 void write_screen_picture(const fs::path& png, const Image& image, const ScreenLook& look) {

@@ -12,15 +12,18 @@
 #include <set>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "fibers/baked/fabric_pack.h"
 #include "formats/image_file.h"
+#include "pipeline/kept_picture.h"
 #include "pipeline/stages.h"
 #include "pipeline/surface_stages.h"
 #include "pipeline/warnings.h"
 #include "pipeline/work_time.h"
 #include "render/cloth_scene.h"
+#include "render/kept_samples.h"
 #include "render/methods.h"
 #include "render/path_tracer.h"
 #include "render/scene_config.h"
@@ -76,6 +79,18 @@ struct PictureRequest {
   PixelFilter filter = {};
   LayerChoice layers = {};    // none where nobody asks
   bool light_groups = false;  // those of the scene, each in a layer of its own
+  // What the samples are kept in, if anything; not with paths, `seconds`, `more` or `noise`.
+  struct Keep {
+    std::filesystem::path file;
+    bool with_light = false;   // of the groups
+    std::string view;          // by whose name it is found again
+    std::optional<int> order;  // of the transfer, as the variant has it
+  };
+  std::optional<Keep> keep = {};
+  // Where they come from instead of eye rays; its picture was asked for as this one. Both outlive
+  // the request.
+  const ChunkFile* kept_samples = nullptr;
+  const KeptPicture* kept_picture = nullptr;
 };
 
 /// A picture and what is worth knowing of its making.
@@ -113,6 +128,9 @@ class SceneJob {
   /// that shares the picture's random numbers would look smaller than it is.
   PictureRequest reference_request(const ViewConfig& view) const;
 
+  /// Hashes of all that the picture depends on but its lights and its background, by names for
+  /// people.
+  std::vector<std::pair<std::string, std::string>> parts_but_lights(const PictureRequest& request);
   /// Builds what the picture needs; equal keys, equal pictures.
   std::string picture_key(const PictureRequest& request);
   /// The report holds the warnings of docs/stability.md; they are said on the console too, unless
@@ -142,7 +160,19 @@ class SceneJob {
   VisibilityBlend blend_for(RenderMethod method) const;
   /// Puts the sample of its pattern in the place of the cloth's fabrics.
   BlockLayout weave_borders(ClothConfig& cloth, const std::filesystem::path& scene_file);
-  Needs needs_for(RenderMethod method, const std::filesystem::path& fabric) const;
+  /// Under the scene's lights, unless others are given.
+  Needs needs_for(RenderMethod method, const std::filesystem::path& fabric) const {
+    return needs_for(method, fabric, config_.lights);
+  }
+  Needs needs_for(RenderMethod method, const std::filesystem::path& fabric,
+                  std::span<const Light> lights) const;
+  /// [group] of what its light depends on besides those parts.
+  std::vector<std::string> light_keys(const PictureRequest& request);
+  KeptPicture kept_picture_of(const PictureRequest& request, const Shading& shading);
+  SampleStore store_for(const PictureRequest& request, const Shading& shading);
+  void say_relit(const SampleStore& store) const;
+  /// Says how large the file becomes; bytes of memory that it takes on the way.
+  std::uint64_t announce_keeping(const PictureRequest& request) const;
   std::unique_ptr<Shading> shading_for(const PictureRequest& request,
                                        std::optional<int> transfer_order = {});
   using Fabrics = std::map<std::filesystem::path, std::unique_ptr<FabricStages>>;
@@ -170,6 +200,9 @@ class SceneJob {
   std::map<RenderMethod, std::unique_ptr<Loaded>> loaded_;
 };
 
+/// Found out before hours of work: FileError if the files below could not be put there. Makes the
+/// folder.
+void require_picture_writable(const std::filesystem::path& exr);
 /// PATH.exr, and beside it a tone-mapped PATH.png and the report as PATH.json.
 void write_picture(const std::filesystem::path& exr, const PictureResult& picture,
                    const nlohmann::ordered_json& report, const ScreenLook& look);

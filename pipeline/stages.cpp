@@ -646,7 +646,7 @@ Artifact FabricStages::far(std::optional<int> order) {
   });
 }
 
-Artifact FabricStages::pack(const Needs& needs) {
+Stage FabricStages::pack_stage(const Needs& needs) {
   std::vector<std::pair<std::string, std::string>> upstream = {
       {"fibers.safetensors", synth_stage().key}};
   if (needs.ssdf) upstream.emplace_back("ssdf.safetensors", ssdf_stage().key);
@@ -658,7 +658,11 @@ Artifact FabricStages::pack(const Needs& needs) {
   if (needs.volume) upstream.emplace_back("volume.vdb", volume_stage().key);
   if (needs.far) upstream.emplace_back("far.safetensors", far_stage(needs.order).key);
   upstream.emplace_back("light_from", light_from());
-  const Stage stage = make_stage("pack", "", document_.config.name, std::move(upstream));
+  return make_stage("pack", "", document_.config.name, std::move(upstream));
+}
+
+Artifact FabricStages::pack(const Needs& needs) {
+  const Stage stage = pack_stage(needs);
   return artifact_of(
       stage, [&](const fs::path& folder, StageResult&) { fill_pack(folder, stage.key, needs); });
 }

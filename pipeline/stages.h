@@ -197,6 +197,8 @@ class FabricStages {
   Artifact volume();
   Artifact far(std::optional<int> order);
   Artifact pack(const Needs& needs);
+  /// Key of that pack, which is not built.
+  std::string pack_key(const Needs& needs) { return pack_stage(needs).key; }
 
   /// What the methods are worth on this fabric (pipeline/accuracy/measure_accuracy.h). With a
   /// surface model: what that is worth in place of the fibers.
@@ -247,6 +249,7 @@ class FabricStages {
   void compute_maps(const Stage& stage, const std::filesystem::path& file, std::uint32_t first,
                     std::uint32_t end);
   Stage synth_stage() const;
+  Stage pack_stage(const Needs& needs);
   Stage fit_stage(const std::string& name);
   Stage ssdf_stage();
   Stage sg_stage();

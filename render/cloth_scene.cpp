@@ -89,6 +89,7 @@ ClothScene::ClothScene(std::vector<ClothPiece> pieces, std::vector<TriangleMesh>
         std::vector<TriangleMesh> meshes;
         for (const SurfaceCloth& surface : surfaces_) meshes.push_back(surface.triangle_mesh());
         meshes.insert(meshes.end(), black_meshes.begin(), black_meshes.end());
+        mesh_count_ = meshes.size();
         return meshes;
       }()) {}
 

@@ -5,6 +5,12 @@
 
 namespace heddle {
 
+Vec3 far_direction(const ClothScene& scene, const ShellHit& hit, const Vec3& to_eye) {
+  const Vec3 own = scene.fabric_direction(hit, to_eye);
+  const Vec3 smooth = scene.smooth_fabric_direction(hit, to_eye);
+  return smooth.z() * own.z() < 0 ? own : smooth;  // the side that is seen
+}
+
 ClothScene::Passing FarWay::pass(std::uint32_t cloth, const ShellInterval& interval) {
   using enum ClothScene::Passing;
   const std::uint32_t part = scene_->part_at(cloth, interval.fabric0);
@@ -30,9 +36,7 @@ ClothScene::Passing FarWay::pass(std::uint32_t cloth, const ShellInterval& inter
                      t,
                      ray_->origin + t * ray_->direction.cast<double>().normalized(),
                      interval.fabric0 + s * (interval.fabric1 - interval.fabric0)};
-  Vec3 smooth_wo = scene_->smooth_fabric_direction(hit, -ray_->direction);
-  if (smooth_wo.z() * wo.z() < 0) smooth_wo = wo;  // the side that is seen
-  stops_.push_back({hit, smooth_wo, weight});
+  stops_.push_back({hit, far_direction(*scene_, hit, -ray_->direction), weight});
   return left_ > 0 ? kSkip : kStop;
 }
 

@@ -14,6 +14,9 @@
 
 namespace heddle {
 
+/// Where the eye is (fabric space), seen from a place that shows its far form. to_eye: world.
+Vec3 far_direction(const ClothScene& scene, const ShellHit& hit, const Vec3& to_eye);
+
 class FarWay {
  public:
   /// far_from: repeats of a fabric in the footprint of the ray from which nothing but its far form

@@ -25,7 +25,9 @@ GBufferPass::GBufferPass(const ClothScene& scene, std::vector<const FabricPack*>
       seed_(seed),
       filter_(std::move(filter)) {}
 
-GBuffer GBufferPass::run(const Camera& camera, const PixelRect& block, int first, int last) const {
+template <class See>
+GBuffer GBufferPass::fill(const Camera& camera, const PixelRect& block, int first, int last,
+                          See&& see) const {
   GBuffer g_buffer;
   g_buffer.block = block;
   g_buffer.first = first;
@@ -38,9 +40,22 @@ GBuffer GBufferPass::run(const Camera& camera, const PixelRect& block, int first
     const double x = block.x0 + pixel % block.width + filter_.place(random.uniform_double());
     const double y = block.y0 + pixel / block.width + filter_.place(random.uniform_double());
     const EyeRay ray = camera.ray(x, y);
-    look(ray, sample, far_from_ ? random.uniform() : 0.0F, g_buffer);
+    add(ray, sample, see(sample, ray, far_from_ ? random.uniform() : 0.0F), g_buffer);
   }
   return g_buffer;
+}
+
+GBuffer GBufferPass::run(const Camera& camera, const PixelRect& block, int first, int last) const {
+  return fill(camera, block, first, last,
+              [this](std::uint32_t sample, const EyeRay& ray, float far_draw) {
+                return look(ray, sample, far_draw);
+              });
+}
+
+GBuffer GBufferPass::restore(const Camera& camera, const PixelRect& block, int first, int last,
+                             const Sights& sights) const {
+  return fill(camera, block, first, last,
+              [&](std::uint32_t sample, const EyeRay& ray, float) { return sights(sample, ray); });
 }
 
 std::optional<ShellHit> GBufferPass::first_fiber(const SceneRay& ray, FarWay& way) const {
@@ -54,18 +69,27 @@ std::optional<ShellHit> GBufferPass::first_fiber(const SceneRay& ray, FarWay& wa
   return scene_->first_hit(ray, RayReach::kEverything, query, pass);
 }
 
-void GBufferPass::look(const EyeRay& ray, std::uint32_t sample, float far_draw,
-                       GBuffer& g_buffer) const {
+Sight GBufferPass::look(const EyeRay& ray, std::uint32_t sample, float far_draw) const {
+  Sight sight;
   SceneRay scene_ray{ray.origin, ray.direction};
-  const std::optional<MeshHit> mesh = scene_->first_mesh(ray.origin, ray.direction);
-  if (mesh) scene_ray.t_max = mesh->t;
+  sight.mesh = scene_->first_mesh(ray.origin, ray.direction);
+  if (sight.mesh) scene_ray.t_max = sight.mesh->t;
   FarWay way(*scene_, packs_, far_from_.value_or(0), ray, far_draw);
-  const std::optional<ShellHit> hit = first_fiber(scene_ray, way);
-  const Vec3 wo = -ray.direction;
+  sight.fiber = first_fiber(scene_ray, way);
   for (const FarWay::Stop& stop : way.stops())
-    g_buffer.far.push_back({sample, stop.hit, stop.wo, stop.weight});
-  g_buffer.covered[sample] = hit || mesh ? 1 : 1 - way.left();
-  if (!(way.left() > 0)) return;
+    sight.far.push_back({sample, stop.hit, stop.wo, stop.weight});
+  sight.left = way.left();
+  return sight;
+}
+
+void GBufferPass::add(const EyeRay& ray, std::uint32_t sample, Sight&& sight,
+                      GBuffer& g_buffer) const {
+  g_buffer.far.insert(g_buffer.far.end(), sight.far.begin(), sight.far.end());
+  const std::optional<ShellHit>& hit = sight.fiber;
+  const std::optional<MeshHit>& mesh = sight.mesh;
+  g_buffer.covered[sample] = hit || mesh ? 1 : 1 - sight.left;
+  if (!(sight.left > 0)) return;
+  const Vec3 wo = -ray.direction;
   if (hit) {
     const FabricPack& pack = *packs_[hit->part];
     const ShadingPoint point{
@@ -74,16 +98,16 @@ void GBufferPass::look(const EyeRay& ray, std::uint32_t sample, float far_draw,
         pack.exemplar.segment_material(hit->segment),
         {scene_->world_tangent(*hit), pack.exemplar.segment_tangent(hit->segment)},
         {wo, scene_->fabric_direction(*hit, wo)}};
-    g_buffer.fibers.push_back({sample, *hit, point, way.left()});
+    g_buffer.fibers.push_back({sample, *hit, point, sight.left});
   } else if (mesh && mesh->surface != nullptr) {
     g_buffer.surfaces.push_back(
-        {sample, mesh->mesh,
+        {sample, *mesh,
          mesh->surface->hit(mesh->triangle, mesh->u, mesh->v, ray.direction, ray.spread * mesh->t),
-         wo, way.left()});
+         wo, sight.left});
   } else if (mesh) {
-    g_buffer.meshes.push_back({sample,
-                               mesh->mesh - static_cast<std::uint32_t>(scene_->surfaces().size()),
-                               ray.origin + mesh->t * ray.direction.cast<double>(), way.left()});
+    g_buffer.meshes.push_back(
+        {sample, mesh->mesh - static_cast<std::uint32_t>(scene_->surfaces().size()), mesh->t,
+         ray.origin + mesh->t * ray.direction.cast<double>(), sight.left});
   }
 }
 

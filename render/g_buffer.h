@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -45,8 +46,8 @@ struct SeenFar {
 
 /// A sample that sees cloth without fibers.
 struct SeenSurface {
-  std::uint32_t sample;   // which of the block's
-  std::uint32_t surface;  // of ClothScene::surfaces()
+  std::uint32_t sample;  // which of the block's
+  MeshHit met;           // MeshHit::mesh: of ClothScene::surfaces()
   SurfaceHit hit;
   Vec3 wo;           // world
   float weight = 1;  // share of the sample
@@ -56,8 +57,17 @@ struct SeenSurface {
 struct SeenMesh {
   std::uint32_t sample;  // which of the block's
   std::uint32_t mesh;    // as MeshHit::mesh, less ClothScene::surfaces()
+  double t;              // mm along the eye ray
   Vec3d position;        // world, mm
   float weight = 1;      // share of the sample
+};
+
+/// What one eye ray meets, as far as rays had to look for it: the rest follows from the eye ray.
+struct Sight {
+  std::vector<SeenFar> far;       // in the order of the ray
+  float left = 1;                 // share of the sample that goes on past them
+  std::optional<ShellHit> fiber;  // what that meets: a fiber
+  std::optional<MeshHit> mesh;    // or else a mesh
 };
 
 /// Samples first .. last - 1 of every pixel of `block`: sample k is number first + k % per_pixel()
@@ -115,10 +125,19 @@ class GBufferPass {
               std::uint64_t seed, PixelFilter filter = {});
 
   GBuffer run(const Camera& camera, const PixelRect& block, int first, int last) const;
+  /// The same from what eye rays are known to meet: asked for sample by sample, in order. No ray
+  /// is traced.
+  using Sights = std::function<Sight(std::uint32_t sample, const EyeRay& ray)>;
+  GBuffer restore(const Camera& camera, const PixelRect& block, int first, int last,
+                  const Sights& sights) const;
 
  private:
   std::optional<ShellHit> first_fiber(const SceneRay& ray, FarWay& way) const;
-  void look(const EyeRay& ray, std::uint32_t sample, float far_draw, GBuffer& g_buffer) const;
+  Sight look(const EyeRay& ray, std::uint32_t sample, float far_draw) const;
+  void add(const EyeRay& ray, std::uint32_t sample, Sight&& sight, GBuffer& g_buffer) const;
+  /// `see`: Sight(sample, eye ray, draw between fibers and far form)
+  template <class See>
+  GBuffer fill(const Camera& camera, const PixelRect& block, int first, int last, See&& see) const;
 
   const ClothScene* scene_;
   std::vector<const FabricPack*> packs_;

@@ -1,5 +1,7 @@
 #include "render/light_visibility.h"
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -30,6 +32,20 @@ Vec2 sample_gaussian2(RandomStream& random) {
 }
 
 }  // namespace
+
+std::string visibility_text(std::span<const Light> lights) {
+  std::string text;
+  for (const Light& light : lights) {
+    text +=
+        fmt::format("{} {:a} {:a}", static_cast<int>(light.type), light.sharpness, light.radius_mm);
+    for (const Vec3d& v : {light.axis.cast<double>().eval(), light.position_mm, light.half_right_mm,
+                           light.half_up_mm})
+      text += fmt::format(" {:a},{:a},{:a}", v.x(), v.y(), v.z());
+    // A near light without radiance counts as seen from its dark side.
+    text += (light.irradiance == 0).all() ? " dark\n" : "\n";
+  }
+  return text;
+}
 
 LightVisibilityPass::LightVisibilityPass(const ClothScene& scene, std::vector<Part> parts,
                                          std::span<const Light> lights, bool draw_directions,

@@ -15,6 +15,7 @@
 
 #include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "fibers/math/random.h"
@@ -41,6 +42,9 @@ struct LightVisibility {
     return visible[seen * lights + light];
   }
 };
+
+/// All that visibility takes from lights: equal texts, equal visibility.
+std::string visibility_text(std::span<const Light> lights);
 
 class LightVisibilityPass {
  public:

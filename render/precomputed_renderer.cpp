@@ -19,13 +19,6 @@
 namespace heddle {
 namespace {
 
-/// A block of kBlockEdge x kBlockEdge pixels takes this many samples at a time. 2048 samples fill a
-/// G-buffer of 400 KB, and give a close-up enough samples per cell to sort.
-constexpr int kBlockSamples = 8;
-
-/// Blocks between two calls of the progress callback.
-constexpr int kBlocksPerReport = 64;
-
 std::optional<float> far_from_of(const PrecomputedSettings& settings) {
   return method_row(settings.method).has_far_form ? settings.far_from : std::nullopt;
 }
@@ -203,14 +196,31 @@ std::vector<std::shared_ptr<const FabricShading>> PrecomputedRenderer::make_shad
   return shadings;
 }
 
-std::vector<EyeSample> PrecomputedRenderer::shade(const GBuffer& g_buffer,
-                                                  const LightVisibility& visibility) const {
+GBuffer PrecomputedRenderer::g_buffer(const Camera& camera, const PixelRect& block, int first,
+                                      int last, KeptChunk& kept) const {
+  return g_buffer_pass_.restore(
+      camera, block, first, last,
+      [&kept](std::uint32_t sample, const EyeRay& ray) { return kept.next_sight(sample, ray); });
+}
+
+std::optional<std::string> PrecomputedRenderer::visibility_text() const {
+  if (method_row(settings_.method).draws_light) return {};
+  return heddle::visibility_text(lights_);
+}
+
+std::vector<EyeSample> PrecomputedRenderer::unlit(const GBuffer& g_buffer) const {
   std::vector<EyeSample> seen(g_buffer.sample_count());
   for (std::size_t sample = 0; sample < seen.size(); ++sample) {
     seen[sample].alpha = g_buffer.covered[sample];
     if (g_buffer.covered[sample] < 1)
       seen[sample].background = (1 - g_buffer.covered[sample]) * background_;
   }
+  return seen;
+}
+
+std::vector<EyeSample> PrecomputedRenderer::shade(const GBuffer& g_buffer,
+                                                  const LightVisibility& visibility) const {
+  std::vector<EyeSample> seen = unlit(g_buffer);
   for (const SeenSurface& surface : g_buffer.surfaces) {
     RandomStream random =
         g_buffer.random(settings_.seed, RandomStage::kLightVisibility, surface.sample);
@@ -274,13 +284,13 @@ void PrecomputedRenderer::tint_yarns(const GBuffer& g_buffer, std::span<EyeSampl
 
 Rgb PrecomputedRenderer::surface_light(const SeenSurface& surface, RandomStream& random) const {
   const SurfaceHit& hit = surface.hit;
-  if (surface.surface < settings_.interactive.size() && settings_.interactive[surface.surface]) {
-    const InteractiveSurface& interactive = *settings_.interactive[surface.surface];
+  if (surface.met.mesh < settings_.interactive.size() && settings_.interactive[surface.met.mesh]) {
+    const InteractiveSurface& interactive = *settings_.interactive[surface.met.mesh];
     if (std::none_of(lights_.begin(), lights_.end(), [](const Light& l) { return l.is_near(); }))
       return interactive.light(hit, surface.wo, lights_);
     return interactive.light(hit, surface.wo, far_lights_at(lights_, hit.position));
   }
-  const bool is_solid = scene_->surfaces()[surface.surface].is_solid();
+  const bool is_solid = scene_->surfaces()[surface.met.mesh].is_solid();
   return surface_direct_light(
       hit, surface.wo, scene_lights_, LightEstimator::kCombined, random,
       [&](const Vec3& direction, double distance) {
@@ -308,10 +318,11 @@ FrameBuffers empty_frame(int width, int height, int spp) {
 class BlockPicture {
  public:
   BlockPicture(std::span<const PrecomputedRenderer* const> by_group, const Camera& camera,
-               const PixelRect& crop, FrameBuffers& frame)
+               const PixelRect& crop, const SampleStore& store, FrameBuffers& frame)
       : by_group_(by_group),
         camera_(&camera),
         blocks_{crop},
+        store_(&store),
         frame_(&frame),
         sums_(static_cast<std::size_t>(block_count()) * kBlockPixels),
         parts_(sums_.size(), by_group.size(), by_group[0]->tells_transmitted()) {}
@@ -330,9 +341,7 @@ class BlockPicture {
     std::vector<EyeSample> by_group(by_group_.size());           // of one sample
     for (int first = first_sample; first < last_sample; first += kBlockSamples) {
       const int last = std::min(last_sample, first + kBlockSamples);
-      const GBuffer g_buffer = by_group_[0]->g_buffer(*camera_, block, first, last);
-      for (std::size_t g = 0; g < seen.size(); ++g)
-        seen[g] = by_group_[g]->shade(g_buffer, by_group_[g]->light_visibility(g_buffer));
+      const GBuffer g_buffer = look_and_shade(index, first, last, seen);
       for (int k = 0; k < static_cast<int>(seen[0].size()); ++k) {
         for (std::size_t g = 0; g < seen.size(); ++g)
           by_group[g] = seen[g][static_cast<std::size_t>(k)];
@@ -351,15 +360,76 @@ class BlockPicture {
     }
   }
 
+  /// Makes room for what blocks first .. last - 1 leave to be kept.
+  void begin_keeping(int first, int last) {
+    if (store_->to == nullptr) return;
+    first_kept_ = first;
+    kept_.assign(static_cast<std::size_t>(last - first), {});
+  }
+  /// Writes that, in the order of the blocks.
+  void keep() {
+    for (const std::vector<std::string>& chunks : kept_) {
+      for (const std::string& chunk : chunks) store_->to->add(chunk);
+    }
+    kept_.clear();
+  }
+
  private:
+  /// What eye rays see, and the samples of each group.
+  GBuffer look_and_shade(int index, int first, int last,
+                         std::vector<std::vector<EyeSample>>& seen) {
+    const PixelRect block = blocks_.at(index);
+    const PrecomputedRenderer& looking = *by_group_[0];
+    if (store_->from != nullptr) {
+      KeptChunk chunk(looking.scene(), *store_->from, block, blocks_.crop, first, frame_->spp);
+      GBuffer g_buffer = looking.g_buffer(*camera_, block, first, last, chunk);
+      for (std::size_t g = 0; g < seen.size(); ++g) {
+        const bool is_kept = g < store_->kept_groups;
+        seen[g] = relit(g, g_buffer, is_kept ? chunk.next_group(g_buffer) : KeptGroup{});
+      }
+      return g_buffer;
+    }
+    GBuffer g_buffer = looking.g_buffer(*camera_, block, first, last);
+    std::vector<KeptGroup> groups(seen.size());
+    for (std::size_t g = 0; g < seen.size(); ++g) {
+      groups[g].visibility = by_group_[g]->light_visibility(g_buffer);
+      seen[g] = by_group_[g]->shade(g_buffer, groups[g].visibility);
+      if (store_->keeps_light) groups[g].light = seen[g];
+    }
+    if (store_->to != nullptr) {
+      kept_[static_cast<std::size_t>(index - first_kept_)].push_back(
+          encode_samples(looking.scene(), g_buffer, groups));
+    }
+    return g_buffer;
+  }
+
+  std::vector<EyeSample> relit(std::size_t group, const GBuffer& g_buffer,
+                               const KeptGroup& kept) const {
+    using enum SampleStore::Use;
+    const PrecomputedRenderer& renderer = *by_group_[group];
+    const SampleStore::Use use = store_->use[group];
+    if (use == kSights) return renderer.shade(g_buffer, renderer.light_visibility(g_buffer));
+    if (use == kVisibility) return renderer.shade(g_buffer, kept.visibility);
+    std::vector<EyeSample> seen = renderer.unlit(g_buffer);
+    for (std::size_t k = 0; k < kept.light.size(); ++k) {
+      seen[k].single = kept.light[k].single;
+      seen[k].multiple = kept.light[k].multiple;
+      seen[k].transmitted = kept.light[k].transmitted;
+    }
+    return seen;
+  }
+
   static constexpr std::size_t kBlockPixels = kBlockEdge * kBlockEdge;
 
   std::span<const PrecomputedRenderer* const> by_group_;
   const Camera* camera_;
   PictureBlocks blocks_;
+  const SampleStore* store_;
   FrameBuffers* frame_;
   std::vector<PixelSums> sums_;  // [block][pixel]
   PartSums parts_;               // the same
+  int first_kept_ = 0;
+  std::vector<std::vector<std::string>> kept_;  // [block - first_kept_][chunk]
 };
 
 }  // namespace
@@ -373,20 +443,26 @@ FrameBuffers shade_picture(const PrecomputedRenderer& renderer, const Camera& ca
 
 FrameBuffers shade_picture(std::span<const PrecomputedRenderer* const> by_group,
                            const Camera& camera, const PixelRect& crop, int spp,
-                           const RenderProgress& progress, const MoreSamples& more) {
+                           const RenderProgress& progress, const MoreSamples& more,
+                           const SampleStore& store) {
+  assert(!more || (store.to == nullptr && store.from == nullptr));
   FrameBuffers frame = empty_frame(crop.width, crop.height, spp);
+  frame.spp = spp;
   frame.keep_parts(by_group.size(), by_group[0]->tells_transmitted());
-  BlockPicture picture(by_group, camera, crop, frame);
+  BlockPicture picture(by_group, camera, crop, store, frame);
   const int blocks = picture.block_count();
   std::vector<int> done(frame.pixel_count(), 0);
   std::vector<int> wanted(frame.pixel_count(), spp);
   do {
     for (int start = 0; start < blocks; start += kBlocksPerReport) {
       progress(static_cast<double>(start) / blocks);
-      tbb::parallel_for(start, std::min(blocks, start + kBlocksPerReport), [&](int index) {
+      const int end = std::min(blocks, start + kBlocksPerReport);
+      picture.begin_keeping(start, end);
+      tbb::parallel_for(start, end, [&](int index) {
         const std::size_t first = picture.first_pixel(index);
         picture.shade_block(index, done[first], wanted[first]);
       });
+      picture.keep();
     }
     progress(1.0);
     done = wanted;

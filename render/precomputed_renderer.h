@@ -7,8 +7,8 @@
 //   2. light_visibility.h: shadow rays past all macroscopic things. In: G-buffer, scene, lights.
 //   3. fabric_shading.h, sorted by part, cell and tetrahedron. In: G-buffer, visibility, lights,
 //      the fabrics' data.
-// Whoever keeps a G-buffer relights it by passes 2 and 3; where the lights change their brightness
-// only, by pass 3.
+// A kept G-buffer (kept_samples.h) is relit by passes 2 and 3, by pass 3 where lights change their
+// brightness only, and by neither where a group of lights does not change.
 //
 // Coloured meshes are lit directly in pass 3, with shadows of fibers and meshes. Surface cloths are
 // lit directly too, with shadows of shells and meshes: by one
@@ -26,6 +26,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "fibers/baked/fabric_pack.h"
@@ -37,6 +38,7 @@
 #include "render/fold_light.h"
 #include "render/g_buffer.h"
 #include "render/interactive_surface.h"
+#include "render/kept_samples.h"
 #include "render/light_visibility.h"
 #include "render/lights.h"
 #include "render/methods.h"
@@ -89,12 +91,20 @@ class PrecomputedRenderer {
   GBuffer g_buffer(const Camera& camera, const PixelRect& block, int first, int last) const {
     return g_buffer_pass_.run(camera, block, first, last);
   }
+  /// The same from a file, without rays.
+  GBuffer g_buffer(const Camera& camera, const PixelRect& block, int first, int last,
+                   KeptChunk& kept) const;
   /// Pass 2.
   LightVisibility light_visibility(const GBuffer& g_buffer) const {
     return visibility_pass_.run(g_buffer);
   }
+  /// Of equal lights for this pass, equal texts; nothing where it may not be kept, since it draws
+  /// directions too.
+  std::optional<std::string> visibility_text() const;
   /// Pass 3: [sample of the G-buffer].
   std::vector<EyeSample> shade(const GBuffer& g_buffer, const LightVisibility& visibility) const;
+  /// The samples without any light but the background.
+  std::vector<EyeSample> unlit(const GBuffer& g_buffer) const;
 
   const ClothScene& scene() const { return *scene_; }
 
@@ -127,6 +137,10 @@ class PrecomputedRenderer {
   FoldLight fold_light_;
 };
 
+/// Blocks of pixels between two calls of the progress callback. What is kept of their samples waits
+/// in memory meanwhile.
+inline constexpr int kBlocksPerReport = 64;
+
 /// Beauty, single, multiple, alpha, G-buffer of the first sample. With 2 samples or more also half0
 /// (even samples), half1 (odd samples) and the variance of the pixel's mean. `more` needs these.
 FrameBuffers shade_picture(const PrecomputedRenderer& renderer, const Camera& camera,
@@ -135,10 +149,12 @@ FrameBuffers shade_picture(const PrecomputedRenderer& renderer, const Camera& ca
 
 /// The same with the light of each renderer kept apart: renderers of one scene, each with lights
 /// and a seed of its own. The first one looks through the pixels, and only it has a background.
-/// Order: that of FrameBuffers::light_groups, whose names are left empty.
+/// Order: that of FrameBuffers::light_groups, whose names are left empty. store: not with `more`. A
+/// group whose light comes from there needs no lights. Errors: FileError of the store's file.
 FrameBuffers shade_picture(std::span<const PrecomputedRenderer* const> by_group,
                            const Camera& camera, const PixelRect& crop, int spp,
-                           const RenderProgress& progress, const MoreSamples& more = {});
+                           const RenderProgress& progress, const MoreSamples& more = {},
+                           const SampleStore& store = {});
 
 }  // namespace heddle
 

@@ -219,7 +219,7 @@ class ScenePass {
     }
     for (const SeenSurface& surface : seen.surfaces) {
       sums[pixel_of(seen, surface.sample)].show(
-          namer.of_whole(pieces_->surfaces[surface.surface].name), surface.weight);
+          namer.of_whole(pieces_->surfaces[surface.met.mesh].name), surface.weight);
     }
     for (const SeenMesh& mesh : seen.meshes)
       sums[pixel_of(seen, mesh.sample)].show(namer.of_whole(pieces_->meshes[mesh.mesh]),
@@ -244,9 +244,9 @@ class ScenePass {
       const std::optional<std::size_t> k = at(surface.sample);
       if (!k) continue;
       frame_->position[*k] = surface.hit.position.cast<float>();
-      const SurfaceCloth& cloth = scene_->surfaces()[surface.surface];
+      const SurfaceCloth& cloth = scene_->surfaces()[surface.met.mesh];
       frame_->uv[*k] =
-          pieces_->surfaces[surface.surface].uv(cloth.fabric_at(surface.hit)).cast<float>();
+          pieces_->surfaces[surface.met.mesh].uv(cloth.fabric_at(surface.hit)).cast<float>();
     }
     for (const SeenMesh& mesh : seen.meshes) {
       if (const std::optional<std::size_t> k = at(mesh.sample)) {

@@ -49,6 +49,7 @@ class SurfaceCloth {
 
   TriangleMesh triangle_mesh() const;
 
+  std::size_t triangle_count() const { return mesh_.triangles.size(); }
   std::size_t vertex_count() const { return mesh_.positions.size(); }
   const Vec3d& vertex_position(std::uint32_t vertex) const { return mesh_.positions[vertex]; }
   /// The patch frame at a vertex, seen from one side: hits in between interpolate what it is made

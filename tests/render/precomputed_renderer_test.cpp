@@ -14,6 +14,7 @@
 #include "tests/support/near_lights.h"
 #include "tests/support/pictures.h"
 #include "tests/support/small_exemplars.h"
+#include "tests/support/temporary_folder.h"
 
 namespace heddle {
 namespace {
@@ -330,6 +331,62 @@ TEST(PrecomputedRenderer, FarFormIsSeenWherePixelsCoverRepeats) {
   }
   EXPECT_GT(mixed, 10);
   EXPECT_LT(mixed, 180);
+}
+
+TEST(PrecomputedRenderer, KeptSamplesGiveTheSamePicture) {
+  // Fibers, far forms, gaps, a black mesh and the empty background, in two light groups. The file
+  // serves every way of relighting; samples of pixels end in the middle of a chunk.
+  const auto world = make_world(with_far_form(open_pack(test_cotton())),
+                                {gaussian({0.5F, 0.3F, 1}, 150, 1)}, {half_roof()});
+  const Camera camera = camera_above(7, 40, 20);
+  const PixelRect crop{3, 2, 36, 17};
+  constexpr int kSpp = 11;
+  const auto renderer = [&](const std::vector<Light>& lights, std::uint64_t seed) {
+    PrecomputedSettings settings;
+    settings.seed = seed;
+    settings.far_from = 2.5F;
+    settings.far_forms = {std::make_shared<const FarForm>(*world->pack.far)};
+    return std::make_unique<PrecomputedRenderer>(*world->scene, world->packs, lights,
+                                                 Rgb(0.25F, 0.5F, 0.75F), settings);
+  };
+  const std::vector<Light> dim = {directional({-0.3F, 0.2F, 1}, 1)};
+  const std::vector<Light> bright = {directional({-0.3F, 0.2F, 1}, 3)};
+  const std::vector<Light> moved = {gaussian({0.9F, 0.2F, 1}, 40, 3)};
+  const auto first = renderer(world->lights, 1);
+  const auto picture = [&](const PrecomputedRenderer& a, const PrecomputedRenderer& b,
+                           const SampleStore& store) {
+    const PrecomputedRenderer* groups[] = {&a, &b};
+    return shade_picture(groups, camera, crop, kSpp, test::no_progress, {}, store);
+  };
+  const TemporaryFolder folder;
+  ChunkFileWriter writer(folder.path() / "kept", kKeptMark, "");
+  const FrameBuffers kept =
+      picture(*first, *renderer(dim, 2), {.to = &writer, .keeps_light = true});
+  writer.commit();
+  const ChunkFile file(folder.path() / "kept", kKeptMark, kKeptKind);
+  using enum SampleStore::Use;
+  const auto dark = renderer({}, 1);
+  for (const auto& [lights, use] :
+       {std::pair{dim, kLight}, {bright, kVisibility}, {moved, kSights}}) {
+    const FrameBuffers rendered = picture(*first, *renderer(lights, 2), {});
+    const FrameBuffers relit =
+        picture(*dark, *renderer(use == kLight ? std::vector<Light>{} : lights, 2),
+                {.from = &file, .use = {kLight, use}, .kept_groups = 2});
+    int differ = 0;
+    int as_kept = 0;
+    for (std::size_t k = 0; k < rendered.pixel_count(); ++k) {
+      differ += (relit.beauty[k] != rendered.beauty[k]).any() ||
+                (relit.single[k] != rendered.single[k]).any() ||
+                (relit.variance[k] != rendered.variance[k]).any() ||
+                (relit.light_groups[1].light[k] != rendered.light_groups[1].light[k]).any() ||
+                relit.alpha[k] != rendered.alpha[k] || relit.depth[k] != rendered.depth[k] ||
+                relit.segment[k] != rendered.segment[k] ||
+                relit.fabric_position[k] != rendered.fabric_position[k];
+      as_kept += (relit.beauty[k] == kept.beauty[k]).all();
+    }
+    EXPECT_EQ(differ, 0);
+    EXPECT_EQ(as_kept == static_cast<int>(kept.pixel_count()), use == kLight);
+  }
 }
 
 /// Solid angle of a rectangle from (0, 0) to (a, b) seen from `distance` straight before its
