@@ -76,10 +76,11 @@ Eigen::MatrixXd inverse_of_both(int m, int order) {
   for (int row = 0; row < n; ++row) {
     for (int column = row % 2; column < n; column += 2) gram(row, column) = 2 * above(row, column);
   }
-  const SymmetricEigen eigen = symmetric_eigen(gram);
+  // Not for the mean: light from everywhere then gets all of it.
   const double noise = kMomentNoise * gram.trace() / n;
-  return eigen.vectors * (eigen.values.array() + noise).inverse().matrix().asDiagonal() *
-         eigen.vectors.transpose();
+  for (int row = m == 0 ? 1 : 0; row < n; ++row) gram(row, row) += noise;
+  const SymmetricEigen eigen = symmetric_eigen(gram);
+  return eigen.vectors * eigen.values.cwiseInverse().asDiagonal() * eigen.vectors.transpose();
 }
 
 }  // namespace

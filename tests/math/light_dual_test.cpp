@@ -185,6 +185,20 @@ TEST(TwoSidedDualLaw, BeatsThePlainExpansionAndDoesNotLeak) {
   }
 }
 
+// Light from everywhere brings the mean of the response, which the first moment is, and nothing
+// else.
+TEST(TwoSidedDualLaw, LightFromEverywhereIsTheMean) {
+  std::array<double, sh_count(kOrder)> sum{};
+  over_hemisphere([&](const Vec3d& w, double weight) {
+    for (const Vec3d& side : {w, Vec3d(w.x(), w.y(), -w.z())}) {
+      const auto dual = weights_of_both(side);
+      for (std::size_t j = 0; j < sum.size(); ++j) sum[j] += weight * static_cast<double>(dual[j]);
+    }
+  });
+  for (std::size_t j = 0; j < sum.size(); ++j)
+    EXPECT_NEAR(sum[j], j == 0 ? std::sqrt(4 * kPi) : 0, 2e-4) << j;
+}
+
 // A cloth turned over is the same cloth: harmonics of odd l + m change their sign.
 TEST(TwoSidedDualLaw, BothSidesAreTreatedAlike) {
   const Vec3d w = Vec3d(0.3, -0.5, 0.2).normalized();
