@@ -136,7 +136,7 @@ nlohmann::ordered_json report_of(const std::string& name, const StandIn& stand_i
         {"base_color_of_albedo", numbers_of(p.base_scale)},
         {"subsurface", p.subsurface},
         {"subsurface_color_of_base_color", numbers_of(p.subsurface_tint)},
-        {"specular_IOR", p.specular_ior},
+        {"specular_IOR", p.ior()},
         {"specular_color", numbers_of(p.specular_color)},
         {"sheen", p.sheen},
         {"sheen_color", numbers_of(p.sheen_color)},

@@ -234,7 +234,7 @@ std::string material_x(const std::string& name, const StandIn& stand_in) {
                      fmt::arg("height", stand_in.maps().height_mm), fmt::arg("images", images),
                      fmt::arg("tint", color_text(p.subsurface_tint)),
                      fmt::arg("specular_color", color_text(p.specular_color)),
-                     fmt::arg("ior", p.specular_ior), fmt::arg("subsurface", p.subsurface),
+                     fmt::arg("ior", p.ior()), fmt::arg("subsurface", p.subsurface),
                      fmt::arg("sheen", p.sheen), fmt::arg("sheen_color", color_text(p.sheen_color)),
                      fmt::arg("sheen_roughness", p.sheen_roughness));
 }
@@ -262,7 +262,7 @@ Json gltf_material(const std::string& name, const StandIn& stand_in) {
          {{"anisotropyStrength", 1.0},
           {"anisotropyRotation", kPi / 2},
           {"anisotropyTexture", texture(3)}}},
-        {"KHR_materials_ior", {{"ior", p.specular_ior}}},
+        {"KHR_materials_ior", {{"ior", p.ior()}}},
         {"KHR_materials_sheen",
          {{"sheenColorFactor", numbers(p.sheen * p.sheen_color)},
           {"sheenRoughnessFactor", std::sqrt(p.sheen_roughness)}}},

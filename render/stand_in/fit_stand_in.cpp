@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "fibers/math/nonnegative_least_squares.h"
 
@@ -13,38 +14,47 @@ namespace heddle {
 namespace {
 
 // Texels that stand for all of them.
-constexpr std::size_t kFitTexels = 512;
+constexpr std::size_t kFitTexels = 128;
 constexpr std::size_t kErrorTexels = 4096;
-// A gloss of less is none; one of more would be a metal.
-constexpr double kLeastReflectance = 1e-4;
-constexpr double kMostReflectance = 0.8;
 
 enum Layer { kReflected, kTransmitted, kSpecular, kSheen, kLayers };
 
 /// What the layers send for one pair and colour, each in the amount that the fit multiplies.
 using Columns = std::array<std::array<double, kLayers>, 3>;
 
-/// Amounts of the layers, by colour: base as factors on the albedo, the gloss as reflectance, the
-/// sheen as colour.
-using Amounts = std::array<Eigen::VectorXd, 3>;
-
+/// The colours of the layers for everything else given.
 class StandInFit {
  public:
   StandInFit(const FlatMaps& maps, const FlatResponse& response)
-      : maps_(&maps), response_(&response), columns_(response.pair_count()) {}
+      : maps_(&maps), response_(&response), columns_(response.pair_count()) {
+    Rgbd sum = Rgbd::Zero();
+    for (const Rgb& albedo : maps.albedo) sum += albedo.cast<double>();
+    mean_albedo_ = sum / static_cast<double>(maps.texel_count());
+  }
 
-  /// The best amounts for the roughnesses and the strength of `parameters`. What upper layers take
-  /// from lower ones depends on the amounts: those that came in serve for it, `rounds` times.
-  /// Returns the sum of squares.
-  double solve(StandInParameters& parameters, int rounds) {
+  /// Sets the best colours and the share that goes through. Returns the sum of squares.
+  double solve(StandInParameters& parameters) {
+    fill_columns(parameters);
+    std::array<Rgbd, kLayers> amounts;
     double squares = 0;
-    for (int round = 0; round < rounds; ++round) {
-      fill_columns(parameters);
-      Amounts amounts;
-      squares = 0;
-      for (int c = 0; c < 3; ++c) squares += solve_channel(c, amounts[static_cast<std::size_t>(c)]);
-      set_amounts(amounts, parameters);
+    for (int c = 0; c < 3; ++c) {
+      const auto [of_channel, left] = solve_channel(c);
+      for (std::size_t layer = 0; layer < kLayers; ++layer)
+        amounts[layer][c] = of_channel[static_cast<Eigen::Index>(layer)];
+      squares += left;
     }
+    const Rgbd& reflected = amounts[kReflected];
+    const Rgbd& transmitted = amounts[kTransmitted];
+    constexpr double kMostThrough = 0.95;  // some light is always reflected
+    const double both = reflected.sum() + transmitted.sum();
+    parameters.subsurface = both > 0 ? std::min(kMostThrough, transmitted.sum() / both) : 0;
+    parameters.base_scale = reflected / (1 - parameters.subsurface);
+    for (int c = 0; c < 3; ++c) {
+      const double through = parameters.subsurface * parameters.base_scale[c];
+      parameters.subsurface_tint[c] = through > 0 ? transmitted[c] / through : 1;
+    }
+    parameters.specular_color = amounts[kSpecular];
+    parameters.sheen_color = amounts[kSheen];
     return squares;
   }
 
@@ -54,7 +64,6 @@ class StandInFit {
     plain.base_scale = Rgbd::Ones();
     const StandIn stand_in(*maps_, plain);
     const std::vector<StandInTexel> texels = spread_texels(stand_in, kFitTexels);
-    const double reflectance = parameters.reflectance();
     tbb::parallel_for(std::size_t{0}, columns_.size(), [&](std::size_t pair) {
       const Vec3d wi = response_->light(pair).cast<double>();
       const Vec3d wo = response_->view(pair).cast<double>();
@@ -66,57 +75,45 @@ class StandInFit {
           auto& row = sums[static_cast<std::size_t>(c)];
           row[kReflected] += share * texel.base_color[c] * layers.reflected;
           row[kTransmitted] += share * texel.base_color[c] * layers.transmitted;
-          row[kSpecular] += share * layers.specular / reflectance;
-          row[kSheen] += share * layers.sheen;
+          row[kSpecular] += share * layers.specular;
+          row[kSheen] += share * parameters.sheen * layers.sheen;
         }
       }
       columns_[pair] = sums;
     });
   }
 
-  double solve_channel(int c, Eigen::VectorXd& amounts) const {
+  /// The amounts of the layers and the sum of squares that is left. No layer sends on more light
+  /// than it gets. Pairs count by their relative difference: the forward lobes of fibers, which no
+  /// such sheet has, would otherwise outweigh all else.
+  std::pair<Eigen::VectorXd, double> solve_channel(int c) const {
     Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(kLayers, kLayers);
     Eigen::VectorXd right = Eigen::VectorXd::Zero(kLayers);
     double values = 0;
+    double mean = 0;
+    for (std::size_t pair = 0; pair < columns_.size(); ++pair)
+      mean += response_->mean(pair)[c] / static_cast<double>(columns_.size());
     for (std::size_t pair = 0; pair < columns_.size(); ++pair) {
       const auto& row = columns_[pair][static_cast<std::size_t>(c)];
       const Eigen::Map<const Eigen::Vector<double, kLayers>> column(row.data());
       const double value = response_->mean(pair)[c];
-      gram += column * column.transpose();
-      right += value * column;
-      values += value * value;
+      const double weight = value + mean > 0 ? 1 / ((value + mean) * (value + mean)) : 1;
+      gram += weight * column * column.transpose();
+      right += weight * value * column;
+      values += weight * value * value;
     }
     // A layer that sends nothing anywhere gets nothing.
     gram.diagonal().array() += 1e-12 + 1e-9 * gram.diagonal().maxCoeff();
-    amounts = nonnegative_least_squares(gram, right);
-    return values - 2 * amounts.dot(right) + amounts.dot(gram * amounts);
-  }
-
-  static void set_amounts(const Amounts& amounts, StandInParameters& parameters) {
-    const auto of_layer = [&](Layer layer) {
-      return Rgbd(amounts[0][layer], amounts[1][layer], amounts[2][layer]);
-    };
-    const Rgbd reflected = of_layer(kReflected);
-    const Rgbd transmitted = of_layer(kTransmitted);
-    const double both = reflected.sum() + transmitted.sum();
-    parameters.subsurface = both > 0 ? std::min(0.95, transmitted.sum() / both) : 0;
-    parameters.base_scale = reflected / (1 - parameters.subsurface);
-    for (int c = 0; c < 3; ++c) {
-      const double through = parameters.subsurface * parameters.base_scale[c];
-      parameters.subsurface_tint[c] = through > 0 ? transmitted[c] / through : 1;
-    }
-    const Rgbd specular = of_layer(kSpecular);
-    const double reflectance = std::clamp(specular.maxCoeff(), kLeastReflectance, kMostReflectance);
-    parameters.set_reflectance(reflectance);
-    parameters.specular_color = (specular / reflectance).min(1.0);
-    const Rgbd sheen = of_layer(kSheen);
-    parameters.sheen = std::min(1.0, sheen.maxCoeff());
-    parameters.sheen_color =
-        parameters.sheen > 0 ? Rgbd((sheen / parameters.sheen).min(1.0)) : Rgbd(Rgbd::Ones());
+    const double most_base = 1 / std::max(mean_albedo_[c], 1e-3);
+    const Eigen::VectorXd most = Eigen::Vector<double, kLayers>(most_base, most_base, 1, 1);
+    Eigen::VectorXd amounts = nonnegative_least_squares(gram, right, &most);
+    amounts[kTransmitted] = std::min(amounts[kTransmitted], most_base - amounts[kReflected]);
+    return {amounts, values - 2 * amounts.dot(right) + amounts.dot(gram * amounts)};
   }
 
   const FlatMaps* maps_;
   const FlatResponse* response_;
+  Rgbd mean_albedo_;
   std::vector<Columns> columns_;  // [pair]
 };
 
@@ -126,15 +123,16 @@ struct Searched {
   double least;
   double most;
 };
-constexpr std::array<Searched, 4> kSearched = {{{&StandInParameters::alpha_along, 0.01, 1},
+constexpr std::array<Searched, 6> kSearched = {{{&StandInParameters::alpha_along, 0.01, 1},
                                                 {&StandInParameters::alpha_across, 0.05, 1},
-                                                {&StandInParameters::sheen_roughness, 0.1, 1},
+                                                {&StandInParameters::reflectance, 0.002, 0.25},
+                                                {&StandInParameters::sheen, 0.01, 1},
+                                                {&StandInParameters::sheen_roughness, 0.07, 1},
                                                 {&StandInParameters::normal_strength, 0.1, 1}}};
 
 }  // namespace
 
 StandInParameters fit_stand_in(const FlatMaps& maps, const FlatResponse& response) {
-  constexpr int kRounds = 3;        // of the amounts, which settle quickly
   constexpr double kFirstStep = 2;  // factor on a parameter
   constexpr double kLastStep = 1.05;
   StandInFit fit(maps, response);
@@ -144,7 +142,8 @@ StandInParameters fit_stand_in(const FlatMaps& maps, const FlatResponse& respons
   for (const double along : {0.05, 0.2, 0.6}) {
     StandInParameters start;
     start.alpha_along = along;
-    const double squares = fit.solve(start, kRounds);
+    start.sheen = 0.1;
+    const double squares = fit.solve(start);
     if (squares < least) {
       least = squares;
       best = start;
@@ -158,7 +157,7 @@ StandInParameters fit_stand_in(const FlatMaps& maps, const FlatResponse& respons
         tried.*searched.member =
             std::clamp(best.*searched.member * factor, searched.least, searched.most);
         if (tried.*searched.member == best.*searched.member) continue;
-        const double squares = fit.solve(tried, kRounds);
+        const double squares = fit.solve(tried);
         if (!(squares < least)) continue;
         least = squares;
         best = tried;

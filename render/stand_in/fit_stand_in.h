@@ -1,8 +1,8 @@
 #ifndef HEDDLE_RENDER_STAND_IN_FIT_STAND_IN_H_
 #define HEDDLE_RENDER_STAND_IN_FIT_STAND_IN_H_
-// The stand-in that comes closest to a fabric, and how close that is. Amounts and colours of the
-// layers enter linearly, so they are least squares without negative ones, for each colour channel.
-// Roughnesses and the strength of normals are searched for. Tested in
+// The stand-in that comes closest to a fabric, and how close that is. Colours of the layers enter
+// linearly, so they are least squares within their bounds, for each colour channel. Amounts of
+// gloss and sheen, their roughnesses and the strength of normals are searched for. Tested in
 // tests/render/stand_in/fit_stand_in_test.cpp.
 
 #include <optional>

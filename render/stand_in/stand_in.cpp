@@ -101,16 +101,12 @@ double ggx_value(double alpha_across, double alpha_along, const Vec3d& in, const
 
 }  // namespace
 
-double StandInParameters::reflectance() const {
-  return std::pow((specular_ior - 1) / (specular_ior + 1), 2);
-}
-
-void StandInParameters::set_reflectance(double reflectance) {
-  specular_ior = (1 + std::sqrt(reflectance)) / (1 - std::sqrt(reflectance));
+double StandInParameters::ior() const {
+  return (1 + std::sqrt(reflectance)) / (1 - std::sqrt(reflectance));
 }
 
 StandIn::StandIn(const FlatMaps& maps, const StandInParameters& parameters)
-    : maps_(&maps), parameters_(parameters), reflectance_(parameters.reflectance()) {
+    : maps_(&maps), parameters_(parameters) {
   for (int k = 0; k <= kSheenCells; ++k) {
     sheen_albedo_[static_cast<std::size_t>(k)] = integrated_sheen(
         parameters.sheen_roughness, std::max(kLeastCosine, static_cast<double>(k) / kSheenCells));
@@ -153,7 +149,7 @@ StandInLayers StandIn::layers(const StandInTexel& texel, const Vec3d& wi, const 
   const double cos_out = std::max(kLeastCosine, texel.normal.dot(wo));
   const double mean_alpha = std::sqrt(texel.alpha_along * texel.alpha_across);
   const double below_gloss =
-      std::max(0.0, 1 - gloss_albedo().at(mean_alpha, cos_out, reflectance_));
+      std::max(0.0, 1 - gloss_albedo().at(mean_alpha, cos_out, parameters_.reflectance));
   const double below_sheen =
       below_gloss * std::max(0.0, 1 - parameters_.sheen * sheen_albedo(cos_out));
   if (wi.z() < 0) {
@@ -171,7 +167,7 @@ StandInLayers StandIn::layers(const StandInTexel& texel, const Vec3d& wi, const 
   };
   const double white = schlick_weight(wo.dot(half));
   layers.specular =
-      (reflectance_ * (1 - white) + white) *
+      (parameters_.reflectance * (1 - white) + white) *
       ggx_value(texel.alpha_across, texel.alpha_along, local(wi, std::max(kLeastCosine, cos_in)),
                 local(wo, cos_out), local(half, texel.normal.dot(half)));
   return layers;

@@ -34,15 +34,14 @@ struct StandInParameters {
   Rgbd base_scale = Rgbd::Ones();       // base_color = base_scale * albedo, 1 at most
   double subsurface = 0;                // share of the base that goes through the sheet
   Rgbd subsurface_tint = Rgbd::Ones();  // subsurface_color = subsurface_tint * base_color
-  double specular_ior = 1.5;
+  double reflectance = 0.04;            // of the gloss at normal incidence, before its colour
   Rgbd specular_color = Rgbd::Ones();
   double sheen = 0;
   Rgbd sheen_color = Rgbd::Ones();
   double sheen_roughness = 0.3;
 
-  /// Of the gloss at normal incidence, before the tint.
-  double reflectance() const;
-  void set_reflectance(double reflectance);
+  /// specular_IOR: the index of refraction that has this reflectance.
+  double ior() const;
 };
 
 /// What a texel's maps say.
@@ -83,7 +82,6 @@ class StandIn {
 
   const FlatMaps* maps_;
   StandInParameters parameters_;
-  double reflectance_;
   static constexpr int kSheenCells = 32;  // of cos_out in [0, 1]
   std::array<double, kSheenCells + 1> sheen_albedo_ = {};
 };

@@ -34,7 +34,7 @@ StandInParameters some_parameters() {
   parameters.alpha_across = 0.5;
   parameters.base_scale = Rgbd(1, 0.9, 0.8);
   parameters.subsurface = 0.3;
-  parameters.specular_ior = 1.8;
+  parameters.reflectance = 0.08;
   parameters.specular_color = Rgbd(1, 0.8, 0.6);
   parameters.sheen = 0.3;
   parameters.sheen_color = Rgbd(0.7, 0.8, 1);
@@ -52,7 +52,7 @@ TEST(FitStandInLaw, TheModelsOwnDataGiveItsParameters) {
   // The search ends at steps of 5 %.
   EXPECT_NEAR(found.alpha_along / made.alpha_along, 1, 0.1);
   EXPECT_NEAR(found.alpha_across / made.alpha_across, 1, 0.1);
-  EXPECT_NEAR(found.reflectance() / made.reflectance(), 1, 0.1);
+  EXPECT_NEAR(found.reflectance / made.reflectance, 1, 0.1);
   EXPECT_NEAR(found.specular_color[2], made.specular_color[2], 0.05);
   EXPECT_NEAR(found.sheen, made.sheen, 0.05);
   EXPECT_NEAR(found.subsurface, made.subsurface, 0.02);

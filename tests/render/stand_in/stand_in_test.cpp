@@ -32,7 +32,7 @@ TEST(StandInLaw, AWhiteSheetSendsOnAllLight) {
   maps.albedo.assign(2, Rgb::Ones());
   StandInParameters parameters;
   parameters.alpha_along = parameters.alpha_across = 0.5;
-  parameters.specular_ior = 2;
+  parameters.reflectance = 1.0 / 9;
   parameters.subsurface = 0.4;
   for (const double sheen : {0.0, 0.5}) {
     parameters.sheen = sheen;
