@@ -17,6 +17,9 @@ namespace {
 constexpr std::size_t kFitTexels = 128;
 constexpr std::size_t kErrorTexels = 4096;
 
+// Share of the base that goes through the sheet.
+constexpr double kMostThrough = 0.95;
+
 enum Layer { kReflected, kTransmitted, kSpecular, kSheen, kLayers };
 
 /// What the layers send for one pair and colour, each in the amount that the fit multiplies.
@@ -45,7 +48,6 @@ class StandInFit {
     }
     const Rgbd& reflected = amounts[kReflected];
     const Rgbd& transmitted = amounts[kTransmitted];
-    constexpr double kMostThrough = 0.95;  // some light is always reflected
     const double both = reflected.sum() + transmitted.sum();
     parameters.subsurface = both > 0 ? std::min(kMostThrough, transmitted.sum() / both) : 0;
     parameters.base_scale = reflected / (1 - parameters.subsurface);
@@ -84,23 +86,18 @@ class StandInFit {
   }
 
   /// The amounts of the layers and the sum of squares that is left. No layer sends on more light
-  /// than it gets. Pairs count by their relative difference: the forward lobes of fibers, which no
-  /// such sheet has, would otherwise outweigh all else.
+  /// than it gets: where the base would, less goes through it.
   std::pair<Eigen::VectorXd, double> solve_channel(int c) const {
     Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(kLayers, kLayers);
     Eigen::VectorXd right = Eigen::VectorXd::Zero(kLayers);
     double values = 0;
-    double mean = 0;
-    for (std::size_t pair = 0; pair < columns_.size(); ++pair)
-      mean += response_->mean(pair)[c] / static_cast<double>(columns_.size());
     for (std::size_t pair = 0; pair < columns_.size(); ++pair) {
       const auto& row = columns_[pair][static_cast<std::size_t>(c)];
       const Eigen::Map<const Eigen::Vector<double, kLayers>> column(row.data());
       const double value = response_->mean(pair)[c];
-      const double weight = value + mean > 0 ? 1 / ((value + mean) * (value + mean)) : 1;
-      gram += weight * column * column.transpose();
-      right += weight * value * column;
-      values += weight * value * value;
+      gram += column * column.transpose();
+      right += value * column;
+      values += value * value;
     }
     // A layer that sends nothing anywhere gets nothing.
     gram.diagonal().array() += 1e-12 + 1e-9 * gram.diagonal().maxCoeff();
@@ -108,6 +105,9 @@ class StandInFit {
     const Eigen::VectorXd most = Eigen::Vector<double, kLayers>(most_base, most_base, 1, 1);
     Eigen::VectorXd amounts = nonnegative_least_squares(gram, right, &most);
     amounts[kTransmitted] = std::min(amounts[kTransmitted], most_base - amounts[kReflected]);
+    // Both colours are factors on one map, so one cannot be black alone.
+    amounts[kReflected] =
+        std::max(amounts[kReflected], (1 / kMostThrough - 1) * amounts[kTransmitted]);
     return {amounts, values - 2 * amounts.dot(right) + amounts.dot(gram * amounts)};
   }
 
@@ -125,7 +125,7 @@ struct Searched {
 };
 constexpr std::array<Searched, 6> kSearched = {{{&StandInParameters::alpha_along, 0.01, 1},
                                                 {&StandInParameters::alpha_across, 0.05, 1},
-                                                {&StandInParameters::reflectance, 0.002, 0.25},
+                                                {&StandInParameters::reflectance, 0.002, 0.8},
                                                 {&StandInParameters::sheen, 0.01, 1},
                                                 {&StandInParameters::sheen_roughness, 0.07, 1},
                                                 {&StandInParameters::normal_strength, 0.1, 1}}};
@@ -135,6 +135,8 @@ constexpr std::array<Searched, 6> kSearched = {{{&StandInParameters::alpha_along
 StandInParameters fit_stand_in(const FlatMaps& maps, const FlatResponse& response) {
   constexpr double kFirstStep = 2;  // factor on a parameter
   constexpr double kLastStep = 1.05;
+  // A step that gains less is not worth an odder material.
+  constexpr double kGain = 0.995;
   StandInFit fit(maps, response);
   StandInParameters best;
   double least = std::numeric_limits<double>::infinity();
@@ -158,7 +160,7 @@ StandInParameters fit_stand_in(const FlatMaps& maps, const FlatResponse& respons
             std::clamp(best.*searched.member * factor, searched.least, searched.most);
         if (tried.*searched.member == best.*searched.member) continue;
         const double squares = fit.solve(tried);
-        if (!(squares < least)) continue;
+        if (!(squares < kGain * least)) continue;
         least = squares;
         best = tried;
         better = true;
