@@ -504,26 +504,76 @@ std::map<std::string, std::string> read_png_text(const std::filesystem::path& pa
   return text;
 }
 
-void write_png(const std::filesystem::path& path, int width, int height,
-               const std::vector<std::uint8_t>& rgb,
-               const std::map<std::string, std::string>& text) {
+namespace {
+
+/// Removes the chunks that say how samples become colours on a screen.
+void erase_color_chunks(std::vector<std::byte>& bytes) {
+  for (std::size_t at = kPngSignature; at < bytes.size();) {
+    const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    const std::string_view type = text.substr(at + 4, 4);
+    const std::size_t size = 12 + big_endian_at(text, at);
+    if (type == "sRGB" || type == "gAMA" || type == "cHRM") {
+      const auto begin = bytes.begin() + static_cast<std::ptrdiff_t>(at);
+      bytes.erase(begin, begin + static_cast<std::ptrdiff_t>(size));
+    } else {
+      at += size;
+    }
+  }
+}
+
+/// The bytes of a PNG. `samples` are of libpng's `format`.
+std::vector<std::byte> png_bytes(const std::filesystem::path& path, int width, int height,
+                                 png_uint_32 format, const void* samples) {
   assert(width > 0 && height > 0);
-  assert(rgb.size() == 3 * static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
   // This interface of libpng keeps its long jumps inside and returns 0 on an error.
   png_image image{};
   image.version = PNG_IMAGE_VERSION;
   image.width = static_cast<png_uint_32>(width);
   image.height = static_cast<png_uint_32>(height);
-  image.format = PNG_FORMAT_RGB;
+  image.format = format;
   png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(image);
   std::vector<std::byte> bytes(size);
-  if (png_image_write_to_memory(&image, bytes.data(), &size, 0, rgb.data(), 0, nullptr) == 0) {
+  if (png_image_write_to_memory(&image, bytes.data(), &size, 0, samples, 0, nullptr) == 0) {
     throw FileError(fmt::format("{}: cannot write: {}", path.string(), image.message));
   }
   bytes.resize(size);
+  return bytes;
+}
+
+std::size_t texels(int width, int height) {
+  return static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+}
+
+}  // namespace
+
+void write_png(const std::filesystem::path& path, int width, int height,
+               const std::vector<std::uint8_t>& rgb,
+               const std::map<std::string, std::string>& text) {
+  const bool has_alpha = rgb.size() == 4 * texels(width, height);
+  assert(has_alpha || rgb.size() == 3 * texels(width, height));
+  std::vector<std::byte> bytes =
+      png_bytes(path, width, height, has_alpha ? PNG_FORMAT_RGBA : PNG_FORMAT_RGB, rgb.data());
   const std::string chunks = text_chunks(text);
   const auto* begin = reinterpret_cast<const std::byte*>(chunks.data());
   bytes.insert(bytes.begin() + kPngHeaderEnd, begin, begin + chunks.size());
+  write_file_atomically(path, std::span<const std::byte>(bytes));
+}
+
+void write_data_png(const std::filesystem::path& path, int width, int height,
+                    const std::vector<std::uint8_t>& samples) {
+  const bool is_grey = samples.size() == texels(width, height);
+  assert(is_grey || samples.size() == 3 * texels(width, height));
+  std::vector<std::byte> bytes =
+      png_bytes(path, width, height, is_grey ? PNG_FORMAT_GRAY : PNG_FORMAT_RGB, samples.data());
+  erase_color_chunks(bytes);
+  write_file_atomically(path, std::span<const std::byte>(bytes));
+}
+
+void write_data_png(const std::filesystem::path& path, int width, int height,
+                    const std::vector<std::uint16_t>& grey) {
+  assert(grey.size() == texels(width, height));
+  std::vector<std::byte> bytes = png_bytes(path, width, height, PNG_FORMAT_LINEAR_Y, grey.data());
+  erase_color_chunks(bytes);
   write_file_atomically(path, std::span<const std::byte>(bytes));
 }
 

@@ -1,7 +1,7 @@
 #ifndef HEDDLE_FORMATS_IMAGE_FILE_H_
 #define HEDDLE_FORMATS_IMAGE_FILE_H_
 // Multi-channel images: OpenEXR (scan lines, ZIP) with named channels and string metadata, and
-// 8-bit PNG. Row-major, row 0 at the top. Equal content gives equal bytes (no time stamps). Errors:
+// PNG. Row-major, row 0 at the top. Equal content gives equal bytes (no time stamps). Errors:
 // FileError. Tested in tests/formats/image_file_test.cpp.
 
 #include <cstddef>
@@ -67,11 +67,17 @@ RgbPicture read_png(const std::filesystem::path& path, int max_extent);
 /// The same for the bytes of a file; `name` stands for it in messages.
 RgbPicture parse_png(std::span<const std::byte> bytes, const std::string& name, int max_extent);
 
-/// [height][width][3] bytes, written atomically. text: keywords (1 to 79 Latin-1 characters) and
-/// what they say, as tEXt chunks.
+/// [height][width][3] bytes, or 4 with an alpha that colours are not multiplied by; written
+/// atomically. text: keywords (1 to 79 Latin-1 characters) and what they say, as tEXt chunks.
 void write_png(const std::filesystem::path& path, int width, int height,
                const std::vector<std::uint8_t>& rgb,
                const std::map<std::string, std::string>& text = {});
+/// Numbers and not colours, without any chunk about colour: [height][width] of 8 bits, or
+/// [height][width][3]; or [height][width] of 16 bits. Written atomically.
+void write_data_png(const std::filesystem::path& path, int width, int height,
+                    const std::vector<std::uint8_t>& samples);
+void write_data_png(const std::filesystem::path& path, int width, int height,
+                    const std::vector<std::uint16_t>& grey);
 /// What the tEXt chunks of a PNG file say, by keyword. Their checksums hold.
 std::map<std::string, std::string> read_png_text(const std::filesystem::path& path);
 

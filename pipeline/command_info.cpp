@@ -227,8 +227,8 @@ Report describe_chart(const nlohmann::json& chart) {
   return report;
 }
 
-/// An object of ours whose entries say enough by themselves: the report of a picture, of a plan, or
-/// the record of an artifact.
+/// An object of ours whose entries say enough by themselves: the report of a picture, of a plan, of
+/// an export, or the record of an artifact.
 Report describe_entries(const char* kind, const nlohmann::json& object) {
   Report report = {{"kind", kind}};
   for (const auto& [name, value] : object.items()) report[name] = value;
@@ -243,6 +243,7 @@ Report describe_json(const fs::path& path) {
       const std::string format = json.value("format", "");
       if (format == "heddle chart") return describe_chart(json);
       if (format == "heddle plan") return describe_entries("plan", json);
+      if (format == "heddle stand-in") return describe_entries("stand-in", json);
       if (json.contains("heddle.method")) return describe_entries("report of a picture", json);
       if (json.contains("seal")) return describe_entries("record of an artifact", json);
     }
@@ -251,8 +252,8 @@ Report describe_json(const fs::path& path) {
   }
   throw FileError(
       path.string() +
-      ": expected a chart, the report of a picture or of a plan, an accuracy table, the "
-      "record of an artifact, or a pack's manifest");
+      ": expected a chart, the report of a picture, of a plan or of an export, an accuracy table, "
+      "the record of an artifact, or a pack's manifest");
 }
 
 void add_box(const std::vector<std::array<float, 3>>& points, Report& report) {

@@ -11,6 +11,7 @@
 #include "formats/memory_need.h"
 #include "pipeline/commands.h"
 #include "pipeline/job.h"
+#include "pipeline/output_folder.h"
 #include "pipeline/swatch_picture.h"
 #include "pipeline/work_time.h"
 #include "render/tile_preview.h"
@@ -20,29 +21,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// FileError if a pack may not take this place. It may replace another pack, whole or cut short. It
-/// must not destroy anything else.
-void require_pack_or_nothing(const fs::path& place) {
-  if (!fs::exists(place)) return;
-  if (!fs::is_directory(place)) throw FileError(place.string() + ": exists and is not a folder");
-  for (const auto& entry : fs::directory_iterator(place)) {
-    if (is_pack_file(entry.path().filename().native())) continue;
-    throw FileError(entry.path().string() +
-                    ": is no part of a pack, and would be lost with its folder; remove it or "
-                    "choose another name");
-  }
-}
-
-/// A last slash is no part of a folder's name.
-fs::path without_slash(const fs::path& folder) {
-  return folder.has_filename() ? folder : folder.parent_path();
-}
-
 void require_place_for_pack(const fs::path& folder) {
-  const fs::path place = without_slash(folder);
-  require_pack_or_nothing(place);
-  make_folder(place.parent_path());
-  require_writable(place.parent_path() / kManifestName);
+  require_place_for_folder(folder, "a pack", is_pack_file);
 }
 
 /// Copies a pack out of the cache: beside its place, then into it as a whole.

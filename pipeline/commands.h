@@ -146,9 +146,14 @@ int chart_command(const ChartOptions& options, const CommonOptions& common);
 
 struct ExportOptions {
   std::filesystem::path input;   // fabric .toml, fibers .safetensors, or pack
-  std::filesystem::path output;  // .hair, .bcc or .obj
+  std::filesystem::path output;  // .hair, .bcc or .obj; or a folder
+  // Of the maps in a folder: texels along the longer side, rays per texel.
+  std::optional<int> pixels;
+  std::optional<int> spp;
 };
 /// Writes the fibers of a tile as curves in millimetres, each over one period, from end to end.
+/// Into a folder: a stand-in for renderers that have no fibers (docs/export.md), and prints its
+/// error.
 int export_command(const ExportOptions& options, const CommonOptions& common);
 
 /// Prints what a file holds.

@@ -67,7 +67,7 @@ struct Options {
   RunOptions run;
   SwatchOptions swatch;
   CatalogueOptions catalogue;
-  ExportOptions curves;
+  ExportOptions exported;
   PlanOptions plan;
 };
 
@@ -422,18 +422,25 @@ void add_info(CLI::App& app, Options& options, Actions& actions) {
 
 void add_export(CLI::App& app, Options& options, Actions& actions) {
   CLI::App* command = app.add_subcommand(
-      "export", "The fibers of a tile as curves in millimetres, for other programs");
+      "export", "For other programs: the fibers of a tile as curves, or a material with its maps");
   add_common(*command, options);
   add_fabric_seed(*command, options);
   command
-      ->add_option("INPUT", options.curves.input,
+      ->add_option("INPUT", options.exported.input,
                    "Fabric .toml, its fibers .safetensors, or a pack")
       ->required();
   command
-      ->add_option("-o,--output,--outfile", options.curves.output,
-                   "File .hair, .bcc or .obj (lines)")
+      ->add_option("-o,--output,--outfile", options.exported.output,
+                   "File .hair, .bcc or .obj (lines); or a folder, for maps with a MaterialX and a "
+                   "glTF material")
       ->required();
-  actions["export"] = [&options] { return export_command(options.curves, options.common); };
+  command
+      ->add_option("--pixels", options.exported.pixels,
+                   "Of maps: texels along their longer side; 512 by default")
+      ->check(CLI::Range(1, 4096));
+  command->add_option("--spp", options.exported.spp, "Of maps: rays per texel; 64 by default")
+      ->check(CLI::Range(2, 1 << 20));
+  actions["export"] = [&options] { return export_command(options.exported, options.common); };
 }
 
 void add_check(CLI::App& app, Options& options, Actions& actions) {

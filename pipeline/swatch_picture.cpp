@@ -6,7 +6,6 @@
 
 #include "fibers/tracing/tile_trace.h"
 #include "formats/image_file.h"
-#include "render/lights.h"
 #include "render/tone_map.h"
 #include "render/walked_light.h"
 
@@ -24,24 +23,21 @@ Light soft(const Vec3& axis, float sharpness, float irradiance) {
   return light;
 }
 
-/// A white surface under these shows about 0.8. They are soft, so that paths find them by escaping:
-/// as little noise as with shadow rays, and 2.7 times as many paths in the same time (white
-/// cotton).
-std::vector<Light> lights_of_swatch(bool both_sides) {
+}  // namespace
+
+std::vector<Light> swatch_lights(bool both_sides) {
   std::vector<Light> lights = {soft(Vec3(0.7F, 0.35F, 1), 10, 2.2F),
                                soft(Vec3(-0.5F, 0.4F, 1), 2, 1.2F)};
   if (both_sides) lights.push_back(soft(Vec3(0.1F, 0.4F, -1), 3, 2.0F));
   return lights;
 }
 
-}  // namespace
-
 std::vector<Rgb> trace_swatch(const TileScene& tile, bool both_sides, const SwatchView& view,
                               std::uint64_t seed, const std::function<void(double)>& progress) {
   const TileTrace trace(tile);
   std::vector<BcsdfTable> materials;
   for (const FiberScattering& fiber : tile.exemplar().scattering) materials.emplace_back(fiber);
-  const std::vector<Light> lights = lights_of_swatch(both_sides);
+  const std::vector<Light> lights = swatch_lights(both_sides);
   const Rgb background = Rgb::Constant(both_sides ? 0.6F : 0.0F);
   const double tilt = radians(kViewDegrees);
   const Vec3 eye = Vec3d(0, -std::sin(tilt), std::cos(tilt)).cast<float>();

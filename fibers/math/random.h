@@ -35,6 +35,9 @@ enum class RandomStage : std::uint32_t {
   kYarnTint = 15,
   kLightRedraw = 16,
   kFar = 17,
+  kFlatMaps = 18,
+  kFlatResponse = 19,
+  kStandInPicture = 20,
 };
 
 /// SplitMix64 finaliser: a bijection of 64-bit words whose output bits all depend on all input

@@ -16,7 +16,7 @@ double square(double x) {
 }
 
 /// The share of Schlick's Fresnel term that is white, whatever the reflectance.
-double schlick_weight(double cosine) {
+double white_share(double cosine) {
   const double m = std::clamp(1 - cosine, 0.0, 1.0);
   return square(square(m)) * m;
 }
@@ -62,7 +62,7 @@ void Paint::fill_table() {
       if (!(wi.z() > 0)) continue;
       const double out = smith_lambda(wo.z(), alpha_);
       const double open = (1 + out) / (1 + out + smith_lambda(wi.z(), alpha_));
-      const double white = schlick_weight(wi.dot((wi + wo).normalized()));
+      const double white = white_share(wi.dot((wi + wo).normalized()));
       plain += open * (1 - white);
       grazing += open * white;
     }
@@ -83,7 +83,7 @@ Rgbd Paint::gloss_albedo(double cosine) const {
 Rgbd Paint::gloss(const Vec3d& wi, const Vec3d& wo) const {
   const Vec3d half = (wi + wo).normalized();
   const double masked = 1 / (1 + smith_lambda(wi.z(), alpha_) + smith_lambda(wo.z(), alpha_));
-  const double white = schlick_weight(half.dot(wi));
+  const double white = white_share(half.dot(wi));
   return (config_.reflectance * (1 - white) + white) *
          (ggx_density(half.z(), alpha_) * masked / (4 * wi.z() * wo.z()));
 }

@@ -16,9 +16,11 @@
 #include <sys/resource.h>
 
 #include <algorithm>
+#include <cstdio>
 #include <cstring>
 #include <fstream>
 #include <limits>
+#include <memory>
 
 #include "tests/formats/file_fixture.h"
 
@@ -476,6 +478,53 @@ TEST_F(ImageFileFormat, PngRoundTripAndEqualBytes) {
   ASSERT_NE(png_image_finish_read(&image, nullptr, read.data(), 0, nullptr), 0);
   EXPECT_EQ(read, rgb);
   EXPECT_NE(error_of([&] { write_png(folder_ / "no" / "a.png", width, height, rgb); }), "no error");
+}
+
+// Numbers come back as they are, and nothing in the file asks a program to convert them.
+TEST_F(ImageFileFormat, DataPngsHaveNoColourChunks) {
+  const std::vector<std::uint8_t> grey = {0, 1, 127, 128, 254, 255};
+  const std::vector<std::uint16_t> deep = {0, 1, 255, 256, 40000, 65535};
+  const std::vector<std::uint8_t> rgb = {1, 2, 3, 4, 5, 6};
+  write_data_png(folder_ / "grey.png", 3, 2, grey);
+  write_data_png(folder_ / "deep.png", 2, 3, deep);
+  write_data_png(folder_ / "rgb.png", 2, 1, rgb);
+  EXPECT_EQ(read_png_header(folder_ / "grey.png").channels, 1);
+  EXPECT_EQ(read_png(folder_ / "rgb.png", 2).rgb, rgb);
+  for (const char* name : {"grey.png", "deep.png", "rgb.png"}) {
+    const std::string bytes = bytes_of(folder_ / name);
+    for (const char* chunk : {"sRGB", "gAMA", "cHRM"})
+      EXPECT_EQ(bytes.find(chunk), std::string::npos) << name << chunk;
+  }
+  const std::vector<std::uint8_t> read_grey = read_png(folder_ / "grey.png", 3).rgb;
+  for (std::size_t k = 0; k < grey.size(); ++k) EXPECT_EQ(read_grey[3 * k], grey[k]);
+  // 16 bits, by libpng's plain interface: the other one would convert.
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(
+      std::fopen((folder_ / "deep.png").c_str(), "rb"), std::fclose);
+  png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);
+  png_infop info = png_create_info_struct(png);
+  png_init_io(png, file.get());
+  png_read_png(png, info, PNG_TRANSFORM_SWAP_ENDIAN, nullptr);
+  EXPECT_EQ(png_get_bit_depth(png, info), 16);
+  for (std::size_t k = 0; k < deep.size(); ++k) {
+    std::uint16_t value = 0;
+    std::memcpy(&value, png_get_rows(png, info)[k / 2] + 2 * (k % 2), 2);
+    EXPECT_EQ(value, deep[k]);
+  }
+  png_destroy_read_struct(&png, &info, nullptr);
+}
+
+// Colours with an alpha are stored beside it, not multiplied by it.
+TEST_F(ImageFileFormat, PngWithAlpha) {
+  const std::vector<std::uint8_t> rgba = {200, 100, 50, 0, 10, 20, 30, 255};
+  write_png(folder_ / "a.png", 2, 1, rgba);
+  EXPECT_EQ(read_png_header(folder_ / "a.png").channels, 4);
+  png_image image{};
+  image.version = PNG_IMAGE_VERSION;
+  ASSERT_NE(png_image_begin_read_from_file(&image, (folder_ / "a.png").c_str()), 0);
+  image.format = PNG_FORMAT_RGBA;
+  std::vector<std::uint8_t> read(rgba.size());
+  ASSERT_NE(png_image_finish_read(&image, nullptr, read.data(), 0, nullptr), 0);
+  EXPECT_EQ(read, rgba);
 }
 
 }  // namespace
