@@ -26,15 +26,15 @@ std::vector<std::string> upper_half(std::size_t n) {
   return map;
 }
 
-const std::vector<double> kHeights = {1, 0.8, 0, -0.6};
+const std::vector<double> kSphereHeights = {1, 0.8, 0, -0.6};
 
 TEST(EvalVisibility, HalfSpace) {
   Json request = request_of(upper_half(16));
   const double sharpness = 30;
   request["sharpness"] = sharpness;
   const Json value = eval_value<Json>(request);
-  for (std::size_t i = 0; i < kHeights.size(); ++i) {
-    const double distance = std::asin(kHeights[i]);
+  for (std::size_t i = 0; i < kSphereHeights.size(); ++i) {
+    const double distance = std::asin(kSphereHeights[i]);
     // (1, 0, 0) lies on the edge itself: distance 0 on either side.
     EXPECT_NEAR(value["ssdf"][i].get<double>(), distance, 1e-12);
     EXPECT_NEAR(value["ssdf_integral"][i].get<double>(),
@@ -107,9 +107,9 @@ TEST(EvalVisibility, AxesCountAndSharpnessAreWhatIsAskedFor) {
   request["weights"] = "voronoi";
   const Json value = eval_value<Json>(request);
   const double weight = LatLongGrid(static_cast<int>(n)).solid_angle(0);
-  for (std::size_t i = 0; i < kHeights.size(); ++i) {
+  for (std::size_t i = 0; i < kSphereHeights.size(); ++i) {
     EXPECT_NEAR(value["sg_sum"][i].get<double>(),
-                weight * std::exp(128 * (kHeights[i] - 1)) / sg_mass(128.0), 1e-15);
+                weight * std::exp(128 * (kSphereHeights[i] - 1)) / sg_mass(128.0), 1e-15);
   }
 }
 

@@ -60,7 +60,7 @@ class SequenceShop {
   TemporaryFolder folder_;
 };
 
-inline constexpr char kEverything[] = R"([[cloth]]
+inline constexpr char kSceneOfEverything[] = R"([[cloth]]
 flat_mm = [1, 1]
 translate_mm = [-0.4, 0, 0.3]
 pattern = { picture = "two.png", fabric = [{ color = "#000000", file = "fabric.toml" }, { color = "#ffffff", file = "dark.toml" }] }
@@ -96,7 +96,7 @@ class EverythingShop : public SequenceShop {
     write("everything.toml",
           edited(edited(kSmallScene, "flat_mm = [4, 4]", "flat_mm = [0.5, 0.5]"),
                  "position_mm = [0.1, -0.5, 1.0]", "position_mm = [0.1, -2, 4]") +
-              kEverything);
+              kSceneOfEverything);
   }
 };
 

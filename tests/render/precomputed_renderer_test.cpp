@@ -106,11 +106,12 @@ struct PackWorld {
 };
 
 std::unique_ptr<PackWorld> make_world(FabricPack pack, std::vector<Light> lights,
-                                      std::vector<TriangleMesh> meshes = {}) {
+                                      std::vector<TriangleMesh> meshes = {},
+                                      bool underlay = false) {
   auto world = std::make_unique<PackWorld>();
   world->pack = std::move(pack);
   std::vector<ClothPiece> pieces;
-  pieces.push_back({std::make_shared<TileScene>(world->pack.exemplar), flat_cloth(6, 4)});
+  pieces.push_back({std::make_shared<TileScene>(world->pack.exemplar), flat_cloth(6, 4), underlay});
   world->scene = std::make_unique<ClothScene>(std::move(pieces), std::move(meshes));
   world->packs = {&world->pack};
   world->lights = std::move(lights);
@@ -142,6 +143,25 @@ TEST(PrecomputedRendererLaw, OpenFurnaceOfWhiteFibersIsOne) {
     if (frame.alpha[k] < 1) continue;
     EXPECT_LT((frame.multiple[k] - 1).abs().maxCoeff(), 1e-4);
     EXPECT_LT((frame.beauty[k] - 1).abs().maxCoeff(), 1e-4);
+  }
+}
+
+// Local visibility knows already that the cloth hides what lies below it: an underlay does so once
+// more. Light of which a part lies below must not be darkened by it again.
+TEST(PrecomputedRendererLaw, AnUnderlayDoesNotDarkenLightFromBothSides) {
+  const std::vector<Light> lights = {gaussian({0.7F, 0, 0.7F}, 2, 3)};
+  const FabricPack pack = open_pack(test::white_fiber(), true);
+  const auto bare = make_world(pack, lights);
+  const auto lined = make_world(pack, lights, {}, true);
+  const Camera camera = camera_above(1, 12, 8);
+  const auto picture = [&](const PackWorld& world) {
+    return shade_picture(world.renderer(), camera, {0, 0, 12, 8}, 4, test::no_progress);
+  };
+  const FrameBuffers expected = picture(*bare);
+  const FrameBuffers got = picture(*lined);
+  for (std::size_t k = 0; k < got.pixel_count(); ++k) {
+    if (expected.alpha[k] < 1) continue;
+    EXPECT_LT((got.beauty[k] - expected.beauty[k]).abs().maxCoeff(), 1e-6) << k;
   }
 }
 
