@@ -136,7 +136,7 @@ StandInParameters fit_stand_in(const FlatMaps& maps, const FlatResponse& respons
   constexpr double kFirstStep = 2;  // factor on a parameter
   constexpr double kLastStep = 1.05;
   // A step that gains less is not worth an odder material.
-  constexpr double kGain = 0.995;
+  constexpr double kGain = 0.999;
   StandInFit fit(maps, response);
   StandInParameters best;
   double least = std::numeric_limits<double>::infinity();
