@@ -18,6 +18,7 @@
 #include "formats/input_error.h"
 #include "pipeline/commands.h"
 #include "pipeline/job.h"
+#include "pipeline/json_file.h"
 #include "pipeline/output_folder.h"
 #include "pipeline/stages.h"
 #include "pipeline/stand_in_files.h"
@@ -112,23 +113,19 @@ FlatResponse response_of(const TileScene& tile, std::span<const BcsdfTable> mate
                              rays, seed, percent_of(progress));
 }
 
-nlohmann::ordered_json numbers_of(const Rgbd& color) {
-  return {color[0], color[1], color[2]};
-}
-
 /// What lies in stand_in.json.
 nlohmann::ordered_json report_of(const std::string& name, const StandIn& stand_in,
                                  const FlatResponse& tested) {
   const FlatMaps& maps = stand_in.maps();
   const StandInParameters& p = stand_in.parameters();
-  const auto [low, high] = std::minmax_element(maps.relief_mm.begin(), maps.relief_mm.end());
+  const auto [low, high] = maps.relief_range_mm();
   nlohmann::ordered_json report = {
       {"format", "heddle stand-in"},
       {"fabric", name},
       {"repeat_mm", {maps.width_mm, maps.height_mm}},
       {"texels", {maps.width, maps.height}},
       {"cover", maps.cover()},
-      {"height_mm", {{"black", *low}, {"white", *high}}},
+      {"height_mm", {{"black", low}, {"white", high}}},
       {"model",
        {{"normal_strength", p.normal_strength},
         {"alpha_along", p.alpha_along},
@@ -164,8 +161,7 @@ int export_stand_in(const ExportOptions& options, const CommonOptions& common) {
   require_place_for_folder(options.output, "an export", is_stand_in_file);
   const NamedExemplar fabric = exemplar_of(options.input, common);
   const TileScene tile(fabric.exemplar);
-  std::vector<BcsdfTable> materials;
-  for (const FiberScattering& fiber : fabric.exemplar.scattering) materials.emplace_back(fiber);
+  const std::vector<BcsdfTable> materials = bcsdf_tables(fabric.exemplar.scattering);
 
   const std::vector<Light> lights = swatch_lights(false);
   FlatMapSettings settings{.seed = fabric.seed};

@@ -96,12 +96,9 @@ void require_all_chunks(const KeptPicture& kept, const CameraConfig& camera,
   const bool is_inside = crop.x0 >= 0 && crop.y0 >= 0 && crop.width > 0 && crop.height > 0 &&
                          crop.width <= camera.width - crop.x0 &&
                          crop.height <= camera.height - crop.y0;
-  const auto pieces = [](int whole, int piece) {
-    return static_cast<std::uint64_t>(whole / piece) + (whole % piece == 0 ? 0U : 1U);
-  };
   if (is_inside && kept.spp > 0 &&
-      file.count() == pieces(crop.width, kBlockEdge) * pieces(crop.height, kBlockEdge) *
-                          pieces(kept.spp, kBlockSamples))
+      file.count() ==
+          static_cast<std::size_t>(PictureBlocks{crop}.count()) * chunks_of_block(kept.spp))
     return;
   throw FileError(file.path().string() + ": does not hold the samples that it says");
 }

@@ -570,8 +570,7 @@ struct FabricStages::TransferWork {
 std::unique_ptr<FabricStages::TransferWork> FabricStages::transfer_work(
     const TransferSettings& settings) {
   auto work = std::make_unique<TransferWork>();
-  for (const FiberScattering& scattering : exemplar().scattering)
-    work->materials.emplace_back(scattering);
+  work->materials = bcsdf_tables(exemplar().scattering);
   work->settings = settings;
   const double mean_free_path = scene().mean_free_path(settings.seed, kMeanFreePathSamples);
   work->cells = make_segment_cells(

@@ -13,6 +13,7 @@
 #include "formats/atomic_file.h"
 #include "formats/image_file.h"
 #include "pipeline/chart/xml_text.h"
+#include "pipeline/json_file.h"
 #include "render/tone_map.h"
 
 namespace heddle {
@@ -63,7 +64,7 @@ void write_maps(const fs::path& folder, const StandIn& stand_in) {
     colors.push_back(stand_in.texel(k).base_color.cast<float>());
   const Samples color = tone_map(colors, {});
   Samples opacity, normal, tangent, along, across, color_alpha, roughness, anisotropy;
-  const auto [low, high] = std::minmax_element(maps.relief_mm.begin(), maps.relief_mm.end());
+  const auto [low, high] = maps.relief_range_mm();
   std::vector<std::uint16_t> relief;
   for (std::size_t k = 0; k < maps.texel_count(); ++k) {
     const StandInTexel texel = stand_in.texel(k);
@@ -80,9 +81,9 @@ void write_maps(const fs::path& folder, const StandIn& stand_in) {
     append(color_alpha, {color[3 * k], color[3 * k + 1], color[3 * k + 2], cover});
     append(roughness, {255, rough_along, 0});
     append(anisotropy, {byte_of_signed(x), byte_of_signed(y), byte_of(gltf_anisotropy(texel))});
-    const float range = std::max(*high - *low, 1e-9F);
+    const float range = std::max(high - low, 1e-9F);
     relief.push_back(
-        static_cast<std::uint16_t>(std::lround(65535 * (maps.relief_mm[k] - *low) / range)));
+        static_cast<std::uint16_t>(std::lround(65535 * (maps.relief_mm[k] - low) / range)));
   }
   write_png(folder / "base_color.png", maps.width, maps.height, color);
   write_png(folder / "gltf_base_color.png", maps.width, maps.height, color_alpha);
@@ -239,10 +240,6 @@ std::string material_x(const std::string& name, const StandIn& stand_in) {
                      fmt::arg("sheen_roughness", p.sheen_roughness));
 }
 
-Json numbers(const Rgbd& color) {
-  return {color[0], color[1], color[2]};
-}
-
 Json gltf_material(const std::string& name, const StandIn& stand_in) {
   const StandInParameters& p = stand_in.parameters();
   const double reflected = 1 - p.subsurface;
@@ -264,9 +261,9 @@ Json gltf_material(const std::string& name, const StandIn& stand_in) {
           {"anisotropyTexture", texture(3)}}},
         {"KHR_materials_ior", {{"ior", p.ior()}}},
         {"KHR_materials_sheen",
-         {{"sheenColorFactor", numbers(p.sheen * p.sheen_color)},
+         {{"sheenColorFactor", numbers_of(p.sheen * p.sheen_color)},
           {"sheenRoughnessFactor", std::sqrt(p.sheen_roughness)}}},
-        {"KHR_materials_specular", {{"specularColorFactor", numbers(p.specular_color)}}}}}};
+        {"KHR_materials_specular", {{"specularColorFactor", numbers_of(p.specular_color)}}}}}};
   // A few gaps do not pay for what blending costs a renderer.
   constexpr double kOpaque = 0.995;
   material["alphaMode"] = stand_in.maps().cover() < kOpaque ? "BLEND" : "OPAQUE";

@@ -35,8 +35,7 @@ std::vector<Light> swatch_lights(bool both_sides) {
 std::vector<Rgb> trace_swatch(const TileScene& tile, bool both_sides, const SwatchView& view,
                               std::uint64_t seed, const std::function<void(double)>& progress) {
   const TileTrace trace(tile);
-  std::vector<BcsdfTable> materials;
-  for (const FiberScattering& fiber : tile.exemplar().scattering) materials.emplace_back(fiber);
+  const std::vector<BcsdfTable> materials = bcsdf_tables(tile.exemplar().scattering);
   const std::vector<Light> lights = swatch_lights(both_sides);
   const Rgb background = Rgb::Constant(both_sides ? 0.6F : 0.0F);
   const double tilt = radians(kViewDegrees);

@@ -126,11 +126,7 @@ class FarBaker {
     const auto n = static_cast<std::size_t>(table.coefficients());
     projected_.resize(lights_ * n);
     for (std::uint32_t l = 0; l < lights_; ++l) {
-      if (table.both_sides) {
-        two_sided_moments(table.order, light_[l], &projected_[l * n]);
-      } else {
-        evaluate_sh(table.order, light_[l], &projected_[l * n]);
-      }
+      direction_moments(table.order, table.both_sides, light_[l], &projected_[l * n]);
       LightDual::of(table.order, table.both_sides).apply(&projected_[l * n]);
     }
   }

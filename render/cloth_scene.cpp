@@ -85,11 +85,11 @@ ClothScene::ClothScene(std::vector<ClothPiece> pieces, std::vector<TriangleMesh>
       }()),
       boundary_(boundaries(cloths_)),
       surfaces_(std::move(surfaces)),
+      black_mesh_count_(black_meshes.size()),
       meshes_([&] {
         std::vector<TriangleMesh> meshes;
         for (const SurfaceCloth& surface : surfaces_) meshes.push_back(surface.triangle_mesh());
         meshes.insert(meshes.end(), black_meshes.begin(), black_meshes.end());
-        mesh_count_ = meshes.size();
         return meshes;
       }()) {}
 

@@ -95,7 +95,7 @@ class ClothScene {
   /// Surface cloths, then coloured meshes.
   std::span<const SurfaceCloth> surfaces() const { return surfaces_; }
   /// Meshes that are nothing but black, undersides among them.
-  std::size_t black_mesh_count() const { return mesh_count_ - surfaces_.size(); }
+  std::size_t black_mesh_count() const { return black_mesh_count_; }
   bool has_solids() const { return !surfaces_.empty() && surfaces_.back().is_solid(); }
   /// Pieces of fibers; all that `cloth` counts below.
   std::size_t cloth_count() const { return cloths_.size(); }
@@ -254,7 +254,7 @@ class ClothScene {
   std::vector<Cloth> cloths_;
   TriangleScene boundary_;  // mesh index = cloth
   std::vector<SurfaceCloth> surfaces_;
-  std::size_t mesh_count_ = 0;
+  std::size_t black_mesh_count_;
   TriangleScene meshes_;  // the surfaces, then the black meshes
   mutable std::atomic<std::uint64_t> failed_walks_ = 0;
 };

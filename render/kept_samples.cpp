@@ -186,9 +186,8 @@ KeptChunk::KeptChunk(const ClothScene& scene, const ChunkFile& file, const Pixel
                      const PixelRect& crop, int first, int spp)
     : scene_(&scene), file_(&file) {
   const std::size_t number = block_of_pixel(block.x0 - crop.x0, block.y0 - crop.y0, crop.width);
-  const int chunks_of_block = (spp + kBlockSamples - 1) / kBlockSamples;
-  bytes_ = file.chunk(number * static_cast<std::size_t>(chunks_of_block) +
-                      static_cast<std::size_t>(first / kBlockSamples));
+  bytes_ =
+      file.chunk(number * chunks_of_block(spp) + static_cast<std::size_t>(first / kBlockSamples));
 }
 
 void KeptChunk::fail() const {

@@ -4,10 +4,10 @@
 // reach that, and the light of each group. They lie in chunks of a file (formats/chunk_file.h), one
 // for every kBlockSamples samples of a block of pixels, block by block.
 //
-// Nothing is rounded. A fiber takes some 15 bytes: its place along the eye ray in full, the
-// tetrahedron as the step from the hit before, and its place in the fabric as the difference, in
-// units of the last digit, from what the corners of the tetrahedron say of it. Eye rays are drawn
-// again from their random numbers, and all else follows from them. Tested in
+// Nothing is rounded. A fiber takes some 15 bytes. Its place along the eye ray is kept in full, the
+// tetrahedron as the step from the hit before. The corners of the tetrahedron say where in the
+// fabric that is, up to a few units of the last digit, and these are kept. Eye rays are drawn again
+// from their random numbers, and all else follows from them. Tested in
 // tests/render/precomputed_renderer_test.cpp.
 
 #include <cstddef>
@@ -29,6 +29,11 @@ namespace heddle {
 /// A block of kBlockEdge x kBlockEdge pixels takes this many samples at a time. 2048 samples fill a
 /// G-buffer of 400 KB, and give a close-up enough samples per cell to sort.
 inline constexpr int kBlockSamples = 8;
+
+/// Chunks of a block with so many samples per pixel.
+constexpr std::size_t chunks_of_block(int spp) {
+  return static_cast<std::size_t>((spp - 1) / kBlockSamples) + 1;
+}
 
 /// Mark of files of kept samples, and what they are called.
 inline constexpr std::string_view kKeptMark = "HEDDLEGB";

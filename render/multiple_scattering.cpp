@@ -1,6 +1,7 @@
 #include "render/multiple_scattering.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <vector>
 
@@ -36,7 +37,8 @@ MultipleScattering::LightShape::OnCones MultipleScattering::LightShape::on_cones
   return on_cones;
 }
 
-MultipleScattering::LightShape::LightShape(std::optional<float> sharpness, Projection projection)
+MultipleScattering::LightShape::LightShape(std::optional<float> sharpness, Projection projection,
+                                           bool may_come_from_both_sides)
     : directional_(!sharpness),
       projection_(projection),
       on_cones_(on_cones_of(sharpness, projection)) {
@@ -45,6 +47,7 @@ MultipleScattering::LightShape::LightShape(std::optional<float> sharpness, Proje
   const std::vector<double> ratios = spherical_bessel_ratios(kMaxShOrder, *sharpness);
   std::transform(ratios.begin(), ratios.end(), band_.begin(),
                  [](double a) { return static_cast<float>(a); });
+  if (projection == Projection::kPrinted) return;
 
   upper_.assign(static_cast<std::size_t>(kInclinations) * kColumns, 0.0F);
   std::vector<float> rooted(upper_.size(), 0.0F);  // the same with sqrt(z)
@@ -64,11 +67,10 @@ MultipleScattering::LightShape::LightShape(std::optional<float> sharpness, Proje
             cosine * axis + sine * (std::cos(azimuth) * side + std::sin(azimuth) * Vec3d(0, 1, 0));
         if (w.z() <= 0) continue;
         evaluate_sh(kMaxShOrder, w, y.data());
+        for (std::size_t j = 0; j < y.size(); ++j) sum[j] += y[j];
+        if (!may_come_from_both_sides) continue;
         const double root = std::sqrt(w.z());
-        for (std::size_t j = 0; j < y.size(); ++j) {
-          sum[j] += y[j];
-          rooted_sum[j] += root * y[j];
-        }
+        for (std::size_t j = 0; j < y.size(); ++j) rooted_sum[j] += root * y[j];
       }
     }
     for (int l = 0; l <= kMaxShOrder; ++l) {
@@ -80,7 +82,7 @@ MultipleScattering::LightShape::LightShape(std::optional<float> sharpness, Proje
       }
     }
   }
-  fill_both(rooted);
+  if (may_come_from_both_sides) fill_both(rooted);
 }
 
 void MultipleScattering::LightShape::fill_both(const std::vector<float>& rooted) {
@@ -107,14 +109,11 @@ void MultipleScattering::LightShape::moments(int order, bool both_sides, const V
     for (int l = 0; l <= order; ++l) {
       for (int m = -l; m <= l; ++m) moments[l * (l + 1) + m] *= band_[static_cast<std::size_t>(l)];
     }
-  } else if (!directional_) {
-    moments_by_inclination(both_sides ? both_ : upper_, order, axis, moments);
-  } else if (both_sides) {
-    two_sided_moments(order, axis, moments);
-  } else if (axis.z() > 0) {
-    evaluate_sh(order, axis, moments);
+  } else if (directional_) {
+    direction_moments(order, both_sides, axis, moments);
   } else {
-    std::fill_n(moments, sh_count(order), 0.0F);
+    assert(!(both_sides && both_.empty()) && "made for light from the face only");
+    moments_by_inclination(both_sides ? both_ : upper_, order, axis, moments);
   }
 }
 
@@ -224,13 +223,16 @@ void MultipleScattering::incoming(std::uint32_t cell, const LightShapes& shapes,
     transfer_->subtract_incoming_of_cones(cell, in_colors(sum.on_cones).data(), field.data());
 }
 
-LightShapes::LightShapes(LightShape::Projection projection)
-    : projection_(projection), directional_(std::nullopt, projection) {}
+LightShapes::LightShapes(LightShape::Projection projection, bool may_come_from_both_sides)
+    : projection_(projection),
+      may_come_from_both_sides_(may_come_from_both_sides),
+      directional_(std::nullopt, projection) {}
 
 const LightShapes::LightShape& LightShapes::at(std::size_t k) const {
   Late& late = shapes_[k];
   std::call_once(late.once, [&] {
-    late.shape.emplace(kLeast * std::exp2(static_cast<float>(k) / kPerOctave), projection_);
+    late.shape.emplace(kLeast * std::exp2(static_cast<float>(k) / kPerOctave), projection_,
+                       may_come_from_both_sides_);
   });
   return *late.shape;
 }

@@ -82,7 +82,10 @@ class MultipleScattering {
       kDual,     // onto the dual of the moments
       kPrinted,  // onto the harmonics
     };
-    explicit LightShape(std::optional<float> sharpness, Projection projection = Projection::kDual);
+    /// may_come_from_both_sides: also for fabrics whose data take light from below, for which a
+    /// Gaussian needs a table more.
+    explicit LightShape(std::optional<float> sharpness, Projection projection = Projection::kDual,
+                        bool may_come_from_both_sides = true);
 
     /// How light that stays on cones is scattered.
     struct OnCones {
@@ -160,7 +163,7 @@ class MultipleScattering {
 class LightShapes {
  public:
   using LightShape = MultipleScattering::LightShape;
-  explicit LightShapes(LightShape::Projection projection);
+  explicit LightShapes(LightShape::Projection projection, bool may_come_from_both_sides = true);
 
   LightShape::Projection projection() const { return projection_; }
   /// Without a sharpness: directional. Sharpnesses are clamped to kLeast .. kMost.
@@ -180,6 +183,7 @@ class LightShapes {
   const LightShape& at(std::size_t k) const;
 
   LightShape::Projection projection_;
+  bool may_come_from_both_sides_;
   LightShape directional_;
   mutable std::array<Late, kCount> shapes_;
 };

@@ -74,9 +74,7 @@ void PathTracer::trace(const EyeRay& ray, RandomStream& random, std::span<Sample
 }
 
 std::vector<BcsdfTable> scene_materials(const ClothScene& scene) {
-  std::vector<BcsdfTable> tables;
-  for (const FiberScattering& fiber : scene.materials()) tables.emplace_back(fiber);
-  return tables;
+  return bcsdf_tables(scene.materials());
 }
 
 std::vector<BcsdfTable> without_transmission(std::span<const BcsdfTable> materials) {

@@ -91,15 +91,20 @@ MultipleScattering::LightShape::Projection projection_of(const MethodRow& method
   return method.as_printed ? Projection::kPrinted : Projection::kDual;
 }
 
+bool takes_both_sides(std::span<const FabricPack* const> packs) {
+  return std::any_of(packs.begin(), packs.end(),
+                     [](const FabricPack* pack) { return pack->light_from_both_sides; });
+}
+
 /// [light]; of near lights, a directional one, which nobody uses.
 std::vector<MultipleScattering::LightShape> shapes_of(std::span<const Light> lights,
-                                                      const MethodRow& method) {
+                                                      const MethodRow& method, bool both_sides) {
   std::vector<MultipleScattering::LightShape> shapes;
   if (!method.takes_transfer) return shapes;
   for (const Light& light : lights) {
     std::optional<float> sharpness;
     if (light.type == LightType::kSphericalGaussian) sharpness = light.sharpness;
-    shapes.emplace_back(sharpness, projection_of(method));
+    shapes.emplace_back(sharpness, projection_of(method), both_sides);
   }
   return shapes;
 }
@@ -160,8 +165,8 @@ PrecomputedRenderer::PrecomputedRenderer(const ClothScene& scene,
       background_(background),
       settings_(settings),
       packs_(checked(packs, needs_of_settings(settings, lights_))),
-      shapes_(shapes_of(lights_, method_row(settings.method))),
-      near_shapes_(projection_of(method_row(settings.method))),
+      shapes_(shapes_of(lights_, method_row(settings.method), takes_both_sides(packs_))),
+      near_shapes_(projection_of(method_row(settings.method)), takes_both_sides(packs_)),
       shadings_(make_shadings()),
       own_scatterings_(own_scatterings_of(scene, packs_)),
       g_buffer_pass_(scene, packs_, bricks_of(packs, method_row(settings.method)),

@@ -129,8 +129,7 @@ FabricPack load_pack(const std::filesystem::path& folder) {
   pack.key = manifest.key;
   pack.light_from_both_sides = manifest.light_from_both_sides;
   pack.exemplar = read_exemplar(folder / "fibers.safetensors");
-  for (const FiberScattering& scattering : pack.exemplar.scattering)
-    pack.materials.emplace_back(scattering);
+  pack.materials = bcsdf_tables(pack.exemplar.scattering);
 
   const std::size_t segments = pack.exemplar.segment_count();
   const auto require_rows = [&](std::size_t rows, const std::string& name) {

@@ -1,5 +1,6 @@
 #include "fibers/math/light_dual.h"
 
+#include <algorithm>
 #include <cassert>
 #include <cmath>
 
@@ -17,39 +18,32 @@ int index(int l, int m) {
   return l * (l + 1) + m;
 }
 
-/// Integrals over z > 0 of Y_lm Y_l'm, l and l' from m to `order`.
-Eigen::MatrixXd products_above(int m, int order) {
+/// Integrals over z > 0 of Y_lm Y_l'm, l and l' from m to `order`, with the weights of a rule in z.
+Eigen::MatrixXd products_above(int m, int order, const QuadratureRule& rule) {
   const int n = order + 1 - m;
-  // Over z exactly; over the azimuth cos^2(m phi) integrates to pi (2 pi for m = 0), which phi = 0
-  // stands for.
-  Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(n, n);
-  const QuadratureRule rule = gauss_legendre(order + 1, 0, 1);
+  Eigen::MatrixXd products = Eigen::MatrixXd::Zero(n, n);
   std::array<double, sh_count(kMaxShOrder)> y;
   for (std::size_t k = 0; k < rule.nodes.size(); ++k) {
     const double z = rule.nodes[k];
     evaluate_sh(order, Vec3d(std::sqrt(1 - z * z), 0, z), y.data());
     Eigen::VectorXd values(n);
     for (int i = 0; i < n; ++i) values[i] = y[static_cast<std::size_t>(index(m + i, m))];
-    gram += rule.weights[k] * (m == 0 ? 2 : 1) * kPi * values * values.transpose();
-  }
-  return gram;
-}
-
-/// Integrals over z > 0 of sqrt(z) Y_lm Y_l'm, l and l' from m to kMaxShOrder.
-Eigen::MatrixXd rooted_products(int m) {
-  const int n = kMaxShOrder + 1 - m;
-  Eigen::MatrixXd products = Eigen::MatrixXd::Zero(n, n);
-  // In t = sqrt(z) the integrand is a polynomial.
-  const QuadratureRule rule = gauss_legendre(2 * kMaxShOrder + 2, 0, 1);
-  std::array<double, sh_count(kMaxShOrder)> y;
-  for (std::size_t k = 0; k < rule.nodes.size(); ++k) {
-    const double t = rule.nodes[k];
-    evaluate_sh(kMaxShOrder, Vec3d(std::sqrt(1 - t * t * t * t), 0, t * t), y.data());
-    Eigen::VectorXd values(n);
-    for (int i = 0; i < n; ++i) values[i] = y[static_cast<std::size_t>(index(m + i, m))];
-    products += rule.weights[k] * 2 * t * t * (m == 0 ? 2 : 1) * kPi * values * values.transpose();
+    // Over the azimuth cos^2(m phi) integrates to pi (2 pi for m = 0), which phi = 0 stands for.
+    products += rule.weights[k] * (m == 0 ? 2 : 1) * kPi * values * values.transpose();
   }
   return products;
+}
+
+/// The same times sqrt(z), up to kMaxShOrder.
+Eigen::MatrixXd rooted_products(int m) {
+  // In sqrt(z) the integrand is a polynomial.
+  QuadratureRule rule = gauss_legendre(2 * kMaxShOrder + 2, 0, 1);
+  for (std::size_t k = 0; k < rule.nodes.size(); ++k) {
+    const double root = rule.nodes[k];
+    rule.nodes[k] = root * root;
+    rule.weights[k] *= 2 * root * root;
+  }
+  return products_above(m, kMaxShOrder, rule);
 }
 
 /// k_lm of light above the plane is the sum over l' of row l - m times sqrt(z) Y_l'm.
@@ -61,7 +55,8 @@ Eigen::MatrixXd prior_rows(int m) {
 
 Eigen::MatrixXd inverse_above(int m, int order) {
   const int n = order + 1 - m;
-  const SymmetricEigen eigen = symmetric_eigen(products_above(m, order));
+  const SymmetricEigen eigen =
+      symmetric_eigen(products_above(m, order, gauss_legendre(order + 1, 0, 1)));
   Eigen::VectorXd inverse = eigen.values;
   for (int i = 0; i < n; ++i)
     inverse[i] = inverse[i] < LightDual::kLeastShare ? 0.0 : 1 / inverse[i];
@@ -147,13 +142,21 @@ void two_sided_moments(int order, const float* above, const float* below, float*
   }
 }
 
-void two_sided_moments(int order, const Vec3& direction, float* moments) {
+void direction_moments(int order, bool both_sides, const Vec3& direction, float* moments) {
+  const bool is_above = direction.z() > 0;
+  if (!both_sides) {
+    if (is_above) {
+      evaluate_sh(order, direction, moments);
+    } else {
+      std::fill_n(moments, sh_count(order), 0.0F);
+    }
+    return;
+  }
   std::array<float, sh_count(kMaxShOrder)> here;
   const std::array<float, sh_count(kMaxShOrder)> nothing{};
   evaluate_sh(kMaxShOrder, direction, here.data());
   const float root = std::sqrt(std::abs(direction.z()));
   for (float& value : here) value *= root;
-  const bool is_above = direction.z() > 0;
   two_sided_moments(order, is_above ? here.data() : nothing.data(),
                     is_above ? nothing.data() : here.data(), moments);
 }

@@ -35,8 +35,8 @@ class LightDual {
   /// One object per order and kind, kept. order <= kMaxShOrder.
   static const LightDual& of(int order, bool both_sides);
 
-  /// G^+ times `values` ([sh_count(order)]), in place. From the face, values are Y(w) or integrals
-  /// of it over a light; from both sides k(w), from two_sided_moments.
+  /// G^+ times `values` ([sh_count(order)]), in place. Those are the moments of a light: integrals
+  /// of Y(w) over its part above the horizon, or from both sides of k(w).
   void apply(float* values) const;
 
  private:
@@ -50,8 +50,9 @@ class LightDual {
 /// k of a light from both sides: [sh_count(order)]. `above` and `below` are the integrals of the
 /// light times sqrt|z| Y_j over each side: [sh_count(kMaxShOrder)].
 void two_sided_moments(int order, const float* above, const float* below, float* moments);
-/// The same for light from one direction (unit).
-void two_sided_moments(int order, const Vec3& direction, float* moments);
+/// Moments of light from one direction (unit): [sh_count(order)]; 0 for light from below that comes
+/// from the face only.
+void direction_moments(int order, bool both_sides, const Vec3& direction, float* moments);
 
 }  // namespace heddle
 

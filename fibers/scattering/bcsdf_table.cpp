@@ -481,4 +481,8 @@ void BcsdfTable::sh_coefficients(float theta_o, int order, float* out) const {
   for (int j = 0; j < 3 * sh_count(order); ++j) out[j] = low[j] + at.fraction * (high[j] - low[j]);
 }
 
+std::vector<BcsdfTable> bcsdf_tables(std::span<const FiberScattering> fibers) {
+  return {fibers.begin(), fibers.end()};
+}
+
 }  // namespace heddle

@@ -21,6 +21,7 @@
 // tests/fibers/scattering/bcsdf_table_test.cpp.
 
 #include <array>
+#include <span>
 #include <vector>
 
 #include "fibers/math/random.h"
@@ -134,6 +135,9 @@ class BcsdfTable {
   std::vector<Rgb> adjoint_tt_;  // [kRows] the same of S_TT
   std::vector<float> sh_;        // [kRows][(kMaxOrder + 1)^2][3]
 };
+
+/// One table for each fiber.
+std::vector<BcsdfTable> bcsdf_tables(std::span<const FiberScattering> fibers);
 
 }  // namespace heddle
 

@@ -7,16 +7,13 @@
 #include <nlohmann/json.hpp>
 #include <numeric>
 
+#include "pipeline/json_file.h"
 #include "pipeline/version.h"
 
 namespace heddle {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-Json list(const Rgbd& color) {
-  return {color[0], color[1], color[2]};
-}
 
 template <class Value>
 Json or_null(const std::optional<Value>& value) {
@@ -28,8 +25,8 @@ Json error_json(const ChartError& error) {
   return {{"relative_rmse", estimate.relative_rmse},
           {"relative_rmse_low", estimate.rmse_low},
           {"relative_rmse_high", estimate.rmse_high},
-          {"color_ratio", list(estimate.color_ratio)},
-          {"color_ratio_error", list(estimate.color_ratio_error)},
+          {"color_ratio", numbers_of(estimate.color_ratio)},
+          {"color_ratio_error", numbers_of(estimate.color_ratio_error)},
           {"percentile99", estimate.percentile99},
           {"flip", error.flip}};
 }

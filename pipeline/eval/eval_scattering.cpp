@@ -1,13 +1,10 @@
 #include "fibers/scattering/fiber_bcsdf.h"
 #include "fibers/scattering/sg_scatter.h"
 #include "pipeline/eval/eval_quantities.h"
+#include "pipeline/json_file.h"
 
 namespace heddle {
 namespace {
-
-nlohmann::json json_of(const Rgbd& color) {
-  return {color[0], color[1], color[2]};
-}
 
 Rgbd read_color(EvalObject& object, const std::string& field) {
   const std::vector<double> v = object.numbers(field, 3);
@@ -42,14 +39,14 @@ nlohmann::json eval_bcsdf(EvalObject& request) {
   const Vec3d wo = request.direction("wo");
   const Lobe lobe = read_lobe(request);
   request.finish();
-  return json_of(evaluate_bcsdf(fiber, wi, wo, lobe));
+  return numbers_of(evaluate_bcsdf(fiber, wi, wo, lobe));
 }
 
 nlohmann::json eval_bcsdf_albedo(EvalObject& request) {
   const FiberScattering fiber = read_fiber(request);
   const double theta_i = request.inclination("theta_i_deg");
   request.finish();
-  return json_of(bcsdf_albedo(fiber, theta_i));
+  return numbers_of(bcsdf_albedo(fiber, theta_i));
 }
 
 nlohmann::json eval_bcsdf_sh(EvalObject& request) {
@@ -59,7 +56,7 @@ nlohmann::json eval_bcsdf_sh(EvalObject& request) {
   request.finish();
   nlohmann::json rows = nlohmann::json::array();
   for (const Rgbd& coefficient : bcsdf_sh(fiber, theta_o, order))
-    rows.push_back(json_of(coefficient));
+    rows.push_back(numbers_of(coefficient));
   return rows;
 }
 
@@ -70,11 +67,11 @@ nlohmann::json eval_sg_scatter(EvalObject& request) {
   const std::string method = request.choice("method", {"printed", "default", "quadrature"});
   const Lobe lobe = read_lobe(request);
   request.finish();
-  return json_of(sg_scatter(fiber, light, wo,
-                            method == "printed"   ? SgMethod::kPrinted
-                            : method == "default" ? SgMethod::kDefault
-                                                  : SgMethod::kQuadrature,
-                            lobe));
+  return numbers_of(sg_scatter(fiber, light, wo,
+                               method == "printed"   ? SgMethod::kPrinted
+                               : method == "default" ? SgMethod::kDefault
+                                                     : SgMethod::kQuadrature,
+                               lobe));
 }
 
 }  // namespace heddle

@@ -137,6 +137,11 @@ double FlatMaps::cover() const {
   return sum / static_cast<double>(texel_count());
 }
 
+std::pair<float, float> FlatMaps::relief_range_mm() const {
+  const auto [low, high] = std::minmax_element(relief_mm.begin(), relief_mm.end());
+  return {*low, *high};
+}
+
 FlatMaps bake_flat_maps(const TileScene& scene, std::span<const BcsdfTable> materials,
                         std::span<const Light> lights, const FlatMapSettings& settings,
                         const std::function<void(double)>& progress) {

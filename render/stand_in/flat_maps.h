@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <functional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "fibers/math/vector.h"
@@ -37,6 +38,8 @@ struct FlatMaps {
   std::size_t texel_count() const { return opacity.size(); }
   /// Share of the repeat that is fiber.
   double cover() const;
+  /// Least and largest of relief_mm.
+  std::pair<float, float> relief_range_mm() const;
 };
 
 struct FlatMapSettings {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fibers/scattering/fiber_bcsdf.h"
 #include "render/surface/sg_light_quadrature.h"
 
 namespace heddle {
@@ -13,12 +14,6 @@ constexpr int kTableDraws = 48;
 
 double square(double x) {
   return x * x;
-}
-
-/// The share of Schlick's Fresnel term that is white, whatever the reflectance.
-double white_share(double cosine) {
-  const double m = std::clamp(1 - cosine, 0.0, 1.0);
-  return square(square(m)) * m;
 }
 
 double ggx_density(double cos_half, double alpha) {
@@ -62,7 +57,7 @@ void Paint::fill_table() {
       if (!(wi.z() > 0)) continue;
       const double out = smith_lambda(wo.z(), alpha_);
       const double open = (1 + out) / (1 + out + smith_lambda(wi.z(), alpha_));
-      const double white = white_share(wi.dot((wi + wo).normalized()));
+      const double white = schlick_weight(wi.dot((wi + wo).normalized()));
       plain += open * (1 - white);
       grazing += open * white;
     }
@@ -83,7 +78,7 @@ Rgbd Paint::gloss_albedo(double cosine) const {
 Rgbd Paint::gloss(const Vec3d& wi, const Vec3d& wo) const {
   const Vec3d half = (wi + wo).normalized();
   const double masked = 1 / (1 + smith_lambda(wi.z(), alpha_) + smith_lambda(wo.z(), alpha_));
-  const double white = white_share(half.dot(wi));
+  const double white = schlick_weight(half.dot(wi));
   return (config_.reflectance * (1 - white) + white) *
          (ggx_density(half.z(), alpha_) * masked / (4 * wi.z() * wo.z()));
 }

@@ -137,7 +137,7 @@ double error_of_both(const std::function<double(const Vec3d&)>& function,
 
 std::array<float, sh_count(kOrder)> weights_of_both(const Vec3d& w) {
   std::array<float, sh_count(kOrder)> dual;
-  two_sided_moments(kOrder, w.cast<float>(), dual.data());
+  direction_moments(kOrder, true, w.cast<float>(), dual.data());
   LightDual::of(kOrder, true).apply(dual.data());
   return dual;
 }

@@ -29,8 +29,7 @@ struct OpenFabric {
       for (std::size_t c = 0; c < 3; ++c) transfer.matrices[(j * 9 + j) * 3 + c] = 1;
     }
     transfer.paths = {1};
-    for (const FiberScattering& scattering : exemplar.scattering)
-      materials.emplace_back(scattering);
+    materials = bcsdf_tables(exemplar.scattering);
   }
   FarTable bake(FarSettings settings) const {
     return bake_far({&scene, &ssdf, &transfer, {}, materials, 1.0}, settings, [](double) {});

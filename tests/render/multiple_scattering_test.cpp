@@ -256,7 +256,7 @@ TEST(MultipleScatteringAgreement, LightFromBothSidesIsTheMeanOfItsDirections) {
           const double phi = 2 * kPi * (a + 0.5) / kAzimuths;
           const Vec3d w = frame * Vec3d(along, across * std::cos(phi), across * std::sin(phi));
           Weights moments;
-          two_sided_moments(5, w.cast<float>(), moments.data());
+          direction_moments(5, true, w.cast<float>(), moments.data());
           expected += static_cast<float>(shares.weights[p] / kAzimuths) * moments;
         }
       }

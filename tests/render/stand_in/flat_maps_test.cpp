@@ -13,10 +13,8 @@ namespace {
 FlatMaps maps_of(const Exemplar& exemplar, int pixels, int spp,
                  std::span<const Light> lights = {}) {
   const TileScene scene(exemplar);
-  std::vector<BcsdfTable> materials;
-  for (const FiberScattering& fiber : exemplar.scattering) materials.emplace_back(fiber);
-  return bake_flat_maps(scene, materials, lights, {.pixels = pixels, .spp = spp, .seed = 1},
-                        [](double) {});
+  return bake_flat_maps(scene, bcsdf_tables(exemplar.scattering), lights,
+                        {.pixels = pixels, .spp = spp, .seed = 1}, [](double) {});
 }
 
 /// A closed layer of four fibers along x on a tile of 1 mm.
