@@ -470,7 +470,9 @@ std::string text_chunks(const std::map<std::string, std::string>& text) {
   std::string chunks;
   for (const auto& [keyword, value] : text) {
     assert(!keyword.empty() && keyword.size() < 80);
-    const std::string body = "tEXt" + keyword + '\0' + value;
+    std::string body = "tEXt";
+    body.append(keyword).push_back('\0');
+    body.append(value);
     append_big_endian(chunks, static_cast<std::uint32_t>(body.size() - 4));
     chunks += body;
     append_big_endian(chunks, png_checksum(body));

@@ -245,7 +245,7 @@ void LightShapes::moments(int order, bool both_sides, std::optional<float> sharp
   }
   const float place = kPerOctave * std::log2(std::clamp(*sharpness, kLeast, kMost) / kLeast);
   const std::size_t middle =
-      std::clamp<std::size_t>(static_cast<std::size_t>(place + 0.5F), 1, kCount - 2);
+      std::clamp<std::size_t>(static_cast<std::size_t>(std::lround(place)), 1, kCount - 2);
   const float x = place - static_cast<float>(middle);
   const std::array<float, 3> weights = {0.5F * x * (x - 1), 1 - x * x, 0.5F * x * (x + 1)};
   std::fill_n(moments, sh_count(order), 0.0F);
